@@ -362,9 +362,7 @@ def read_choosing(choosing: Choosing) -> dict[str, Any]:
         refuse_unknown(unknown[0], expected_names, other_names)
     oscillator = _check_oscillator(arguments.pop("oscillator", None))
     if (oscillator is None) != (arguments.get("v0") is None):
-        raise ValueError(
-            "oscillator and v0 go together: the one vibrates because of the other"
-        )
+        raise ValueError("give oscillator and v0 together")
     replay = check_flag("replay", arguments.pop("replay", None), True)
     checked = {
         name: check_option(name, value, OPTIONS[name], getattr(Request, name))
@@ -461,7 +459,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected"
+                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected"
             ) from None
         windows.append((tr, td))
     if not windows:

@@ -232,7 +232,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
-                "`parts` recommended stands for a whole set; leave the other `parts` out"
+                "`parts` recommended is a whole set; leave out the other `parts`"
             )
         if request.deck is None:
             raise ArgumentError(
@@ -251,7 +251,7 @@ def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
     bodies = question.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
-        message = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        message = f"--merge {merge} makes one rigid body of unconnected parts: {apart}"
         cautions = (
             *cautions,
             Caution("merged-apart", f"{message}; leave it out to keep them apart"),

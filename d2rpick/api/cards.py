@@ -19,6 +19,7 @@ from d2rpick.base.options import (
     make_option_name,
 )
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,15 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
-_ONLY_JUDGED: Final = (
-    "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
-)
+_ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
 
 
 class CardOptions(TypedDict, total=False):
@@ -291,6 +291,15 @@ class JudgedCard(NamedTuple):
     def verified(self) -> bool:
         """True if all windows are verified."""
         return all(verdict.verified for verdict in self.verdicts)
+
+    @property
+    def worst(self) -> Decision | None:
+        """Verdict on the worst of the judged windows; None if none was judged."""
+        return min(
+            (verdict.decision for verdict in self.verdicts),
+            key=lambda decision: GRADES.index(decision.grade),
+            default=None,
+        )
 
     @property
     def passed(self) -> bool:

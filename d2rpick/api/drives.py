@@ -122,11 +122,11 @@ class Driving:
             computed = journal.all("ended")
             if computed and not resume:
                 raise D2RPickError(
-                    f"{folder}: this run has begun; --resume goes on with it, or choose another folder"
+                    f"{folder}: this run has begun; continue it with --resume, or choose another folder"
                 )
             if computed and begun[0]["deck"] != digest:
                 raise D2RPickError(
-                    f"{folder}: begun with another deck than {self.name} is now; name that one"
+                    f"{folder}: this run was begun with another deck than {self.name} is now; give that deck"
                 )
             if not begun and any(
                 not file.name.startswith(".") for file in folder.iterdir()

@@ -173,7 +173,7 @@ class Request(ChoiceOptions, ReadingOptions):
         """Refuse options that need a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
-                "`step_ratio` needs `cost_share` or `deck` too: the run time needs both"
+                "`step_ratio` needs `cost_share` or `deck` too: the CPU time depends on both"
             )
         if self.weights is not None and self.deck is None:
             raise ArgumentError(

@@ -347,9 +347,7 @@ class Ledger:
     def told(self, runs: int) -> str:
         """Return how many of ``runs`` runs were taken from the file, and why other rows of it were not."""
         if self.outdated:
-            outdated = (
-                f"; {self.outdated} have changed, or were computed with other options"
-            )
+            outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:
             outdated = ""
         if self.damaged:

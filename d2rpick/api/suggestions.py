@@ -313,7 +313,7 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
     """Refuse an incomplete pair: without a switched run both times are needed."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
-            f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
+            f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
         )
 
 

@@ -97,7 +97,7 @@ class PairVerdict(AnswerAtTd):
 
     def _decide(self, better: Pair | None) -> Decision:
         """Decide on the pair; ``better`` is a better one, if known."""
-        unknown = () if self.reasons else ("nothing shows that tr suits this td",)
+        unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         return decide(
             self.situation,
@@ -370,7 +370,7 @@ def suggest_at(
         cautions.append(
             Caution(
                 "no-better-td",
-                "no peak of the energy in the flight has an acceptable tr",
+                "no peak of the energy in the flight has an admissible tr",
             )
         )
     return PairSuggestion(situation, candidates, better, tuple(cautions))
@@ -461,13 +461,16 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     """Return the reason why no candidate is acceptable."""
     if not ranked:
         level = situation.energy_td
-        return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
+        return (
+            f"before td = {situation.td:.6g} the energy neither reaches its value at td, {level:.6g}, nor "
+            "peaks near it"
+        )
     if situation.td > situation.latest_td:
         return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
-    return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"
+    return f"no tr is admissible; the best of {len(ranked)}, tr = {nearest.tr:.6g}: {reasons}"
 
 
 _Answer = TypeVar("_Answer", PairSuggestion, PairVerdict)

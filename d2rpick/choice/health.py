@@ -110,7 +110,7 @@ def assess_health(
     peak = _find_peak(balance)
     if balance.internal is not None and peak is None:
         reason = (
-            "the internal energy never exceeds a millionth of the energy of the run, so "
+            "the internal energy never exceeds 1e-6 of the energy of the run, so "
             "shares of it are meaningless"
         )
         return Health(
@@ -167,7 +167,10 @@ def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     listings = list(find_wrong_energies(sources))
     if listings:
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
-        text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        text = (
+            f"{listings[0]}: {why} in a restart (its pull request 4538); run the reference again with a "
+            "newer version"
+        )
         yield Caution(WRONG_ENERGY, text)
 
 
@@ -200,19 +203,20 @@ _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("negative-sliding", lambda h: _is_above(h.negative_sliding_share, MOST_NEGATIVE_SLIDING),
      "contact energy falls to -{h.negative_sliding_share:.0%} of the internal energy{up_to}: check for penetrations"),
     ("sliding", lambda h: _is_above(h.sliding_share, MOST_SLIDING),
-     "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; only friction can explain that"),
+     "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; check whether friction explains it"),
     ("eroded-energy", lambda h: _is_above(h.eroded_share, MOST_WORK),
-     ("deleted elements hold {h.eroded_share:.0%} of the internal energy{up_to}: it counts as internal energy of the "
-     "model but does not spring back")),
+     ("eroded elements contain {h.eroded_share:.0%} of the internal energy{up_to}: it is part of the "
+      "internal energy of "
+     "the model, but does not spring back after td")),
     ("window-not-judged", lambda h: h.window_reason is not None, "{h.window_reason}"),
     ("contact-in-window", lambda h: _is_above(h.window_sliding, MOST_WORK),
-     ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: where the parts touch "
-     "something, they do not fly freely")),
+     ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: parts in contact do not "
+     "fly freely")),
     ("work-in-window", lambda h: _is_above(h.window_work, MOST_WORK),
-     ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: where it acts on the "
-     "parts, they do not fly freely")),
+     ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: parts on which it acts "
+     "do not fly freely")),
     ("erosion", lambda h: _is_above(h.window_eroded, 0.0),
-     "elements are eroded {where}; elements of rigid parts would not be"),
+     "elements are eroded {where}; rigid parts lose no elements"),
 )  # fmt: skip
 
 
@@ -358,7 +362,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
+            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
         )
         return
     reason = _describe_divergence(history)
@@ -400,8 +404,8 @@ def _describe_divergence(history: History) -> str | None:
     if not gained[state]:
         return None
     return (
-        f"the run blew up: from {earlier_energy[state]:.3g} before, its energy reaches {kinetic[state]:.3g} "
-        f"at {time[state]:.6g}; nothing in it can be trusted"
+        f"the run is unstable: its energy grows from {earlier_energy[state]:.3g} to {kinetic[state]:.3g} "
+        f"at {time[state]:.6g}; repair the model and run it again"
     )
 
 

@@ -135,9 +135,9 @@ def _list_card_remarks(
     """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
-        yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
+        yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
-        yield "The level is that of the whole model, whatever parts are switched."
+        yield "The internal energy is that of the whole model, not of the switched parts alone."
     for verdict in verdicts:
         if len(verdicts) > 1:
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
@@ -167,7 +167,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     measures = [
         f"{name} {value:.3f}"
         for name, value in (
-            ("lock-in error", candidate.lock_in_error),
+            ("frozen-deformation error", candidate.lock_in_error),
             ("level error", candidate.level_error),
             ("kinetic fraction", verdict.situation.kinetic_share),
             ("residual", candidate.residual),

@@ -120,7 +120,7 @@ class Overview(NamedTuple):
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
-            return "no free flight is seen, so nothing can be made rigid"
+            return "no free flight is found, so nothing can be made rigid"
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
 
@@ -130,10 +130,12 @@ class Overview(NamedTuple):
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
-            doubts.append("the files end within a state")
+            doubts.append(
+                "the files end within a state; read them again when the run has ended"
+            )
         if all(source == "energy" for source, _ in self.flights):
             doubts.append(
-                "only the internal energy shows the flights, which is not certain"
+                "the flights are known from the internal energy alone, which is not certain"
             )
         return doubts
 
@@ -154,10 +156,8 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
 def _describe_health(health: Health | None) -> str:
     """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
-        return (
-            "the files do not hold the energy balance that shows whether a run is sound"
-        )
-    return "energies within the limits of practice"
+        return "the files do not contain the energy balance that shows whether a run is sound"
+    return "energies are within their usual limits"
 
 
 def describe_run(
@@ -293,7 +293,7 @@ def _name_missing_output(run: OpenedRun) -> str:
                 ", at least columns x_momentum, y_momentum, z_momentum of the model"
             )
         output = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
-    return f"{output}: only momenta of the parts show for sure when they fly"
+    return f"{output}: only part momenta show for certain when the parts fly"
 
 
 def _read_notes(database: Legs) -> tuple[str, ...]:
@@ -335,7 +335,7 @@ def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
-        effect = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
+        effect = "part data and internal energy mean nothing there and are not used for the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
 
@@ -357,7 +357,7 @@ def _assess_health_of_run(
             states &= (balance.time < start) | (balance.time > end)
         if not states.any():
             return Health(
-                reason="its legs are rigid: energies mean nothing there",
+                reason="all of the run is rigid, so its energies mean nothing",
                 until=float(balance.time[-1]),
             )
         return assess_health(

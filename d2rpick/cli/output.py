@@ -7,7 +7,7 @@ import re
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final, Protocol, TextIO
 
 import click
 
@@ -74,6 +74,21 @@ IN_WORDS: Final = {
     "table",
     "markdown",
 }  # forms whose answer itself says why nothing is recommended
+
+
+class Verdict(Protocol):
+    """Verdict on a pair of times, on which the exit code rests."""
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words."""
+
+    @property
+    def grade(self) -> str:
+        """Grade of the pair."""
+
+    def reaches(self, grade: str) -> bool:
+        """Return True if the pair has at least the given grade."""
 
 
 @dataclass(eq=False, repr=False)
@@ -195,6 +210,18 @@ class Output:
         """Exit with 1 if the answer is an objection, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
+
+    def finish_by_verdict(self, decision: Verdict | None, min_quality: str) -> None:
+        """Exit with 1 if there is no pair, or if its grade is below ``min_quality``, which is then named."""
+        if decision is None or decision.reaches(min_quality):
+            self.finish(objection=decision is None)
+            return
+        if not self.exit_zero:
+            verdict = f"the verdict is {decision.verdict!r} (grade {decision.grade})"
+            tell(
+                f"d2rpick: exit code {OBJECTION}: {verdict}; --min-quality {decision.grade} accepts it"
+            )
+        self.finish(objection=True)
 
     def spare(self, inputs: Iterable[str]) -> None:
         """Raise D2RPickError if a file would replace one of further inputs, which are known only after reading."""

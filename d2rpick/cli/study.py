@@ -232,7 +232,7 @@ def _choose_farm(
 )
 @options.add_options(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
-    """Fit the cost of elements to the processor times of your runs, for --weights.
+    """Fit the cost of elements to the CPU times of your runs, for --weights.
 
     Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
     Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  Costs that the runs

@@ -138,7 +138,8 @@ def _find_least_wait(
     achieved = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in switched) or "none"
     planned = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in windows)
     raise DeckError(
-        f"no wait lets a {what} switch in the planned windows ({planned}): its windows would be {achieved}; plan one"
+        f"no force-free time lets a {what} switch in the planned windows ({planned}): its windows "
+        f"would be {achieved}; plan one"
         " window for each flight, or switch by time"
     )
 

@@ -24,11 +24,11 @@ _MOST_DIGITS = 17
 _COMMENT_WIDTH = 78
 
 PHYSICS = (
-    "The energy locked in at the first switch springs back at the second; the",
-    "  kinetic energy of the vibration is lost without a trace in any energy.",
-    "A switch comes at the first step at or after its time.",
-    "Stresses of solids without a co-rotating frame do not turn with the rigid",
-    "  body: after a large rotation they do not spring back as they should.",
+    "The energy frozen at the first switch springs back at the second; the",
+    "  kinetic energy of the vibration is lost, and no energy output shows it.",
+    "The solver switches at the first time step at or after each time.",
+    "Stresses of solids without a co-rotational frame do not rotate with the rigid",
+    "  body: after a large rotation they spring back in the wrong direction.",
     "Do not choose switching times from the energy of a switched run.",
 )
 
@@ -180,7 +180,9 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
         if not 0 <= tr < td < math.inf:
-            raise DeckError(f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected")
+            raise DeckError(
+                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+            )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:
             relation = "lies before" if end <= tr else "overlaps or touches"

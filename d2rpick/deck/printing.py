@@ -56,11 +56,11 @@ if TYPE_CHECKING:
 _FILE: Final = "switches.k"
 
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # CODE for no force and for a force
-_OF_OFFSET: Final = "OFFSET was not tried with the solver: it should exceed the thickness of the contact."
+_OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _DELETE, _ACTIVATE = 1, 2  # values of NRBF and NCSF for constraints on the parts
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
-    "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
+    "  (NRBF, NCSF, RWF 0); if any, delete them (1) and reactivate them (2).",
 )
 _DELETED = (
     "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
@@ -75,15 +75,15 @@ _OF_RADIOSS = (
     "  node groups; no warning is given.",
     "The energy reported for rigid solids can be wrong until the release.",
     "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
-    "A body that the first file does not put off is rigid from time 0.",
+    "A body that the first file does not deactivate is rigid from time 0.",
     "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
-    "  them there while the body is off.",
+    "  them there while the body is inactive.",
     "An initial velocity must move the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
 _BY_FORCE = (
     "The windows are those of the history: a switched run lands elsewhere, and at",
-    "  other times, after its first window that locks in energy.",
+    "  other times, after its first window that freezes vibration energy.",
     "They end in the first step of a contact, without a margin before it.",
 )
 _OF_SENSORS = tuple(
@@ -282,7 +282,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     )
     if printing.merge is None and printing.bodies:
         yield from (
-            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
+            f"{len(body)} parts are one rigid body in the deck, with lead part {body[0]} (LRB)."
             for body in printing.bodies
             if len(body) > 1
         )
@@ -416,7 +416,7 @@ def _print_sensors(
     )
     step_warning = (
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
-        " where it takes fewer without switching, set --step-cap to the deformable step or more."
+        " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
     # In the file too, since it may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]

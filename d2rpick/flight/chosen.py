@@ -133,7 +133,7 @@ def start_flight_at(
             described=described is not None,
         )
     if flight.end is not None and after >= flight.end:
-        ended = f"the {name_source(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
+        ended = f"the flight ends at {flight.end:.6g} according to the {name_source(flight.source)}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
     doubts = flight.doubts
     shows_start = (
@@ -143,7 +143,10 @@ def start_flight_at(
         history, *flight.within(history.time)
     ):
         evidence = f"the {name_source(flight.source)} shows that the flight begins at {flight.start:.6g}"
-        doubts = (*doubts, f"{evidence}, after `after` {after:.6g}, which is used")
+        doubts = (
+            *doubts,
+            f"{evidence}, after `after` {after:.6g}, which is used nevertheless",
+        )
     return flight._replace(start=after, source="given", doubts=doubts)
 
 
@@ -171,7 +174,10 @@ def end_flight_at(
         and flight.source not in ("energy", "given")
     ):
         evidence = f"the {name_source(flight.source)} shows that the flight ends at {flight.end:.6g}"
-        doubts = (*doubts, f"{evidence}, before `landing` {landing:.6g}, which is used")
+        doubts = (
+            *doubts,
+            f"{evidence}, before `landing` {landing:.6g}, which is used nevertheless",
+        )
         flight = flight._replace(source="given")
     return flight._replace(end=landing, doubts=doubts)
 
@@ -189,7 +195,7 @@ def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
         return flight.doubts
     return (
         *flight.doubts,
-        f"the flight is used as it is given, although {flight.refusal}",
+        f"the flight is used as given, although {flight.refusal}",
     )
 
 
@@ -223,13 +229,13 @@ def _explain_why_fed(history: History, start: float, end: float) -> str | None:
         turns < _LEAST_TURNS
         and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy
     ):
-        return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
+        return f"from {start:.6g} to {end:.6g} the internal energy has {turns} extrema: too few to recognise a flight"
     from d2rpick.flight.work import compute_change_of_balance
 
     change = compute_change_of_balance(balance, start, end)
     if change is not None and change > MOST_WORK * max(energy, 0.0):
         change_text = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
-        return f"{change_text}, at a mean internal energy of {energy:.3g}: a load works there"
+        return f"{change_text}, at a mean internal energy of {energy:.3g}: a load does work there"
     if not has_whole_motion(balance, start, end):
         return (
             f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of "

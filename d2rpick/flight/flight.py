@@ -239,9 +239,9 @@ def _explain_refusal(history: History, witness: Witness, td: float) -> str:
         ):
             contradiction = (
                 f"the momentum is that of free flight at td = {td:.6g}, but the internal "
-                "energy keeps no level"
+                "energy is not that of a free vibration"
             )
-            return f"{contradiction}: parts of the model may touch each other, or energies are wrong"
+            return f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
     return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
 
 
@@ -493,7 +493,7 @@ def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> 
                 for n, f in (shown_flights[0], (other_source, flight))
             )
             doubts.append(
-                f"the flight lasts from {first_text}, from {second_text}; the later start and the earlier end count"
+                f"the flight lasts from {first_text}, from {second_text}; the later start and the earlier end are used"
             )
         if flight.end < end:
             end = flight.end
@@ -526,7 +526,7 @@ def _explain_why_driven(
         return None
     return (
         f"the {name_source(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
-        f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: it is driven"
+        f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: a load drives it"
     )
 
 

@@ -386,7 +386,7 @@ def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
     )
     if not with_energy:
         raise FormatError(
-            f"{run.name}: no part ever has internal energy; name the parts to be switched"
+            f"{run.name}: no part ever has internal energy; name the switched parts with `parts`"
         )
     return with_energy
 
@@ -492,7 +492,7 @@ def _select_heaviest_parts(
     """Return the deformable parts of the flight with the largest product of mass and time."""
     if not found or momenta is None:
         raise FormatError(
-            f"{run.name}: no momenta show which parts fly together; name the parts to be switched"
+            f"{run.name}: no momenta show which parts fly together; name the switched parts with `parts`"
         )
     if momenta.masses is None:
         masses = np.ones(len(run.parts))

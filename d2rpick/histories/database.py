@@ -236,7 +236,7 @@ class Legs:
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(
-                f"{self.source}: only some legs have part {list_names(self._passing)}, which was left out"
+                f"{self.source}: only some restart segments have part {list_names(self._passing)}, which was left out"
             )
         notes += notes_on_states
         if self.parts:
@@ -336,7 +336,7 @@ class Legs:
         keep, notes = find_newest_states(all_times)
         ends = np.cumsum([time.size for time in times])
         unused = [
-            f"{leg.source} was not used: a newer leg begins at or before its first time"
+            f"{leg.source} was not used: a newer restart segment begins at or before its first time"
             for leg, states in zip(self._legs, np.split(keep, ends[:-1]), strict=True)
             if states.size and not states.any()
         ]
@@ -396,7 +396,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(
-        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?"
+        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a restart segment missing?"
         for i in holes[:3]
     )
 

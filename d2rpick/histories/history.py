@@ -362,7 +362,7 @@ class History:
         legs = find_later_legs(self.source)
         if not legs:
             return ""
-        return f"; in the same folder is {', '.join(legs)}, a later leg of the run? Name it too"
+        return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
 
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` are in the record."""
@@ -376,6 +376,7 @@ class History:
         hint = self.left_beside if is_late else ""
         if not hint and argument:
             hint = ask_for_smaller_unit(self.time, times, argument)
+        hint = hint or "; give a time within it"
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))

@@ -368,7 +368,7 @@ def check_legs(legs: Sequence[Database]) -> None:
         if both_hold and held_by_first.isdisjoint(held_by_second):
             raise FormatError(
                 f"{first.source} and {second.source} have neither a column nor a part in common, "
-                "legs of one run were expected; give the files of one run"
+                "restart segments of one run were expected; give the files of one run"
             )
         for times, columns in (
             (_list_model_times, _read_model_energies),
@@ -386,7 +386,7 @@ def check_legs(legs: Sequence[Database]) -> None:
             if not are_alike:
                 raise FormatError(
                     f"{first.source} and {second.source} have different energies at the same times, "
-                    "legs of one run were expected; give the files of one run"
+                    "restart segments of one run were expected; give the files of one run"
                 )
 
 

@@ -131,7 +131,8 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps} (restart); if legs overlap the newer one is used, {dropped} dropped"
+            f"time steps back {steps} (restart); the newer restart segment is used where they "
+            f"overlap, {dropped} dropped"
         )
     return keep, tuple(notes)
 

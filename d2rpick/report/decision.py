@@ -41,7 +41,7 @@ def list_statements(decision: Decision) -> Lines:
     worth = decision.quality.worth
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
     if worth:
-        share = f"; its error holds at most {worth.share:.2%} of the energy of the next contact"
+        share = f"; its error is at most {worth.share:.2%} of the energy of the next contact"
     else:
         share = ""
     return [
@@ -101,4 +101,4 @@ def format_saving(best: Candidate) -> str | None:
 
 def format_saved_share(run_time_share: float) -> str:
     """Return how much CPU time is saved if ``run_time_share`` of it remains."""
-    return f"about {1 - run_time_share:.0%} of the processor time"
+    return f"about {1 - run_time_share:.0%} of the CPU time"

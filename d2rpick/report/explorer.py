@@ -63,7 +63,7 @@ _VALUES: Final[Mapping[str, str]] = {
     "run_time": "saves",
     "level": "energy at td",
     "tolerance": "timing tolerance",
-    "windows": "acceptable tr",
+    "windows": "admissible tr",
     "reason": "no tr",
 }
 # Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
@@ -124,7 +124,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
         if len(flights) > 1
         else "",
         unit=join([f" [{unit}]"] if unit else []),
-        windows=make_element("li", make_element("i", class_="windows"), "acceptable tr")
+        windows=make_element("li", make_element("i", class_="windows"), "admissible tr")
         if "windows" in known_values
         else "",
         below_energy=below[0],
@@ -304,7 +304,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
     """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
-        return "saved, % of the processor time"
+        return "saved, % of the CPU time"
     return "rigid, % of the simulated time"
 
 
@@ -358,7 +358,7 @@ def _format_for_screen_reader(offer: Offer) -> str:
     """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
-        return "nothing acceptable"
+        return "no admissible tr"
     if best.residual is not None:
         return f"residual {format_measure(best.residual)}"
     return offer.decision.verdict if offer.decision else ""
@@ -381,7 +381,7 @@ def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
         )
     if offer.saving is not None and start.saving is not None:
         comparisons.append(
-            f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
+            f"saves {offer.saving:.1%} of the CPU time instead of {start.saving:.1%}"
         )
     if (
         offer.error is not None

@@ -35,6 +35,8 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
+# Colour of what has no verdict: admissible times, rigid windows of a finished run.  Green, yellow and red are verdicts.
+NEUTRAL: Final = "#595959"
 # width of a figure in a file [inch]
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time as a share of the axes, by whether the figure is on a page.

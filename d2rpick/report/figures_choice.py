@@ -19,6 +19,7 @@ from d2rpick.report.figures import (
     BETTER,
     FLIGHT,
     GOOD,
+    NEUTRAL,
     REFERENCE,
     STRETCHES,
     SWITCHED,
@@ -226,11 +227,11 @@ def _draw_energy(
     for number, band in enumerate(
         merge_windows(bands, (view.end - view.start) / STRETCHES)
     ):
-        label = "_" if number else "acceptable tr"
-        axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
+        label = "_" if number else "admissible tr"
+        axes.axvspan(*band, ymax=_BAND, facecolor=NEUTRAL, linewidth=0, label=label)
     for acceptable, fill, name in (
-        (True, GOOD, "acceptable"),
-        (False, "none", "not acceptable"),
+        (True, NEUTRAL, "admissible"),
+        (False, "none", "not admissible"),
     ):
         marked = [
             candidate for candidate in candidates if candidate.acceptable == acceptable
@@ -243,7 +244,7 @@ def _draw_energy(
                 s=28,
                 linewidths=0.7,
                 facecolors=fill,
-                edgecolors=GOOD,
+                edgecolors=NEUTRAL,
                 zorder=3,
                 label=label,
             )
@@ -361,7 +362,7 @@ def draw_run(
     for flight in flights:
         mark_span(axes, flight, "flight")
     for window in windows:
-        axes.axvspan(*window, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
+        axes.axvspan(*window, ymax=_STRIP, color=NEUTRAL, linewidth=0, label="rigid")
     _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=True)
     return figure
 
@@ -415,7 +416,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     td = add_unit("td", history.time_unit)
     rigid.set(
-        ylabel="saved processor time" if cost else "rigid time",
+        ylabel="saves (share of the CPU time)" if cost else "rigid time",
         xlabel=td,
         ylim=(0, None),
     )
@@ -444,7 +445,7 @@ def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) ->
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
     axes.plot(td, drawn, color=REFERENCE, linewidth=0.8, label="best pair for each td")
     axes.plot(
-        td[best], drawn[best], "o", color=GOOD, markersize=4, label="Pareto-optimal"
+        td[best], drawn[best], "o", color=NEUTRAL, markersize=4, label="Pareto-optimal"
     )
 
 
@@ -476,7 +477,9 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
             label="_",
         )
     if answer.common.window:
-        mark_span(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
+        mark_span(
+            axes, answer.common.window, "admissible in all runs", NEUTRAL, alpha=0.2
+        )
     _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
     axes.set(
@@ -541,7 +544,7 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
     if points.size:
         is_thin = len(drawn) > _MANY
         axes.scatter(
-            points[:, 0], points[:, 1], s=8 if is_thin else 28, linewidths=0.7, facecolors=GOOD, edgecolors="white",
+            points[:, 0], points[:, 1], s=8 if is_thin else 28, linewidths=0.7, facecolors=NEUTRAL, edgecolors="white",
             zorder=3, label="tr of each run", rasterized=is_thin,
         )  # fmt: skip
 

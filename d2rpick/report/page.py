@@ -485,16 +485,38 @@ def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
     )
 
 
-def build_solver_input(times: tuple[float, float], record: PageContext) -> Markup:
-    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+def build_solver_input(
+    decision: Decision, times: tuple[float, float], record: PageContext
+) -> Markup:
+    """Return the D2R card of a pair, or the command that prints it; folded below the verdict "do not use"."""
     title = "Solver input"
+    contents = _list_solver_input(times, record)
+    if decision.verdict != DO_NOT_USE:
+        return build_section(title, *contents)
+    badge = make_element("span", decision.verdict, class_="badge refused")
+    return build_section(
+        title,
+        make_element("p", badge),
+        make_element("p", f"{decision.reason}. To improve: {decision.cure}."),
+        make_element(
+            "details",
+            make_element("summary", "Show the card that must not be used"),
+            *contents,
+        ),
+    )
+
+
+def _list_solver_input(
+    times: tuple[float, float], record: PageContext
+) -> tuple[Markup, ...]:
+    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
     printing = record.printing
     assert printing is not None
     if record.refusal:
         reason = f"No card can be printed for these times: {record.refusal}"
-        return build_section(title, make_element("p", reason))
+        return (make_element("p", reason),)
     if record.card:
-        return build_section(title, make_element("pre", record.card.text, tabindex="0"))
+        return (make_element("pre", record.card.text, tabindex="0"),)
     solver = printing.solver or DEFAULT
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
@@ -505,9 +527,7 @@ def build_solver_input(times: tuple[float, float], record: PageContext) -> Marku
         ),
         class_="wrap",
     )
-    return build_section(
-        title, make_element("p", "Printed, and judged again as printed, by"), line
-    )
+    return (make_element("p", "Printed, and judged again as printed, by"), line)
 
 
 def _build_input(situation: Situation, run: OpenedRun) -> Markup:

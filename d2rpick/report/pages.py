@@ -125,9 +125,9 @@ def _build_lower_sections(
     yield build_section("Candidates", *_build_candidates(answer))
     yield page.build_mismatch_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
-    if answer.recommended:
+    if answer.recommended and answer.decision:
         yield page.build_solver_input(
-            (answer.recommended.tr, answer.recommended.td), record
+            answer.decision, (answer.recommended.tr, answer.recommended.td), record
         )
 
 
@@ -215,7 +215,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         )
     yield from page.build_evidence(situation, answer.health, record)
     if record.printing:
-        yield page.build_solver_input(times, record)
+        yield page.build_solver_input(answer.decision, times, record)
 
 
 def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:
@@ -484,7 +484,7 @@ def _build_set_card(best: PartSet | None) -> Markup:
         "span",
         make_element("i", "saves about"),
         f"{best.saving:.0%}",
-        make_element("i", " of the processor time"),
+        make_element("i", " of the CPU time"),
     )
     listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
     return make_element(
@@ -519,7 +519,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         )
     ]
     cards = cards or [make_element("p", "No flight was switched.")]
-    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
+    caption = "Internal energy while the parts are deformable, with the rigid windows; while rigid it means nothing"
     flights = [(window.free, window.contact or window.td) for window in switched]
     rigid = [(window.tr, window.td) for window in switched]
     return build_document(

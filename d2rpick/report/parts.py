@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 SETS = (
     "set",
     "parts",
-    "saves of a step",
+    "saved per step",
     "tr",
     "td",
-    "processor time",
+    "CPU time",
     "saves",
     "out of place",
-    "turned [deg]",
+    "rotated [deg]",
 )
 TABLES = {
     "Parts": (
@@ -152,7 +152,7 @@ _FLIGHT: Final = row(
 )
 _MOST_SHOWN = 6
 # Columns that are left out, in this order, if a terminal is too narrow.
-_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
+_SPARE: Final = ("material", "step", "mass", "saved per step", "rotated [deg]")
 # Verdicts on parts, for people.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
 # Names of the sets, for people.
@@ -397,7 +397,9 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
         else:
             much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
-        cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
+        cures = (
+            "set a maximum with --step-cap; --step-ratio adds its gain to the saving"
+        )
         lines.append(("time step", f"{grows}: {cures}"))
     lines += [
         (name_set(part_set), reason)
@@ -465,7 +467,7 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "parts": lambda part_set: format_part_ranges(part_set.parts),
     "elements": lambda part_set: part_set.elements,
     "mass": lambda part_set: _format_percent(part_set.mass_fraction),
-    "saves of a step": lambda part_set: _format_percent(part_set.cost_share),
+    "saved per step": lambda part_set: _format_percent(part_set.cost_share),
     "step grows": lambda part_set: (
         "free"
         if is_limited_by_no_part(part_set)
@@ -473,10 +475,10 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     ),
     "tr": lambda part_set: part_set.window[0] if part_set.window else None,
     "td": lambda part_set: part_set.window[1] if part_set.window else None,
-    "processor time": lambda part_set: _format_percent(part_set.run_time_share),
+    "CPU time": lambda part_set: _format_percent(part_set.run_time_share),
     "saves": lambda part_set: _format_percent(part_set.saving),
     "out of place": _format_position_error,
-    "turned [deg]": lambda part_set: _format_lower_bound(
+    "rotated [deg]": lambda part_set: _format_lower_bound(
         part_set, part_set.angle_error
     ),
 }

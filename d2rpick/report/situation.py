@@ -45,7 +45,7 @@ def list_situation_heading(
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
-    kinetic = "" if share is None else f", kinetic share {format_measure(share)}"
+    kinetic = "" if share is None else f", kinetic fraction {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", describe_input(situation.history)),
@@ -99,7 +99,9 @@ def _describe_basis(situation: Situation) -> str:
     )
     source = "given" if situation.settings.oscillator else "identified"
     front = f"{summary}; " if summary else ""
-    return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
+    return (
+        f"{front}oscillator, {source}: {', '.join(facts)}; it refines tr and energies"
+    )
 
 
 def _explain_level_alone(situation: Situation) -> str:
@@ -108,7 +110,7 @@ def _explain_level_alone(situation: Situation) -> str:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
     several = "several modes; " if fit and fit.mode and not fit.describes_record else ""
-    return f"energy level alone ({several}the sign is unknown)"
+    return f"energy alone ({several}the direction of the deformation is unknown)"
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
@@ -156,7 +158,7 @@ def list_health_measures(health: Health) -> list[Measure]:
             limits.MOST_NEGATIVE_SLIDING,
         ),
         _make_share_measure(
-            "energy of deleted elements", health.eroded_share, MOST_WORK
+            "energy of eroded elements", health.eroded_share, MOST_WORK
         ),
     ]
     if health.window:
@@ -169,7 +171,7 @@ def list_health_measures(health: Health) -> list[Measure]:
             _make_share_measure(
                 "work beyond gravity and damping there", health.window_work, MOST_WORK
             ),
-            _make_share_measure("energy deleted there", health.window_eroded, 0.0),
+            _make_share_measure("energy eroded there", health.window_eroded, 0.0),
         ]
     return measures
 

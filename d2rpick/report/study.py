@@ -114,11 +114,11 @@ _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
-          "Windows of acceptable tr, and those in which the error is at most 0.05 above that of tr."),
+          "Intervals of admissible tr, and those in which the error is at most 0.05 above that of tr."),
     Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
     Field("asked", "text", "Stands for the options and the version."),
     Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
-    Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
+    Field("profile", maybe(_CURVE), "Times and errors of admissible tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3

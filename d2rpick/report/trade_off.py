@@ -60,7 +60,7 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+_NOT_HALVED: Final = "halves the error and keeps half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -97,7 +97,7 @@ def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     best = trade_off.recommended
     decision = best.decision_with_cure if best else None
     if best is None or best.best is None or decision is None:
-        return [("no pair to use", "no td in the window has an acceptable tr")]
+        return [("no pair to use", _explain_why_no_pair(trade_off))]
     return list_verdict_lines(decision, best.best.tr, best.td)
 
 
@@ -127,12 +127,12 @@ def give_answer(trade_off: TradeOff) -> str:
     step = trade_off.step
     unit = trade_off.situation.history.time_unit
     if start is None:
-        return "no td in the window has an acceptable tr"
-    start_text = f"td = {start.td:.6g}" + (
-        "" if trade_off.requested else " saves the most"
-    )
+        return "no td in the range has an admissible tr"
+    start_text = f"td = {start.td:.6g}"
+    if not trade_off.requested:
+        start_text += f" {_describe_longest(start)}"
     if start.best is None:
-        quality_text = f"{start_text} has no acceptable tr"
+        quality_text = f"{start_text} has no admissible tr"
         return (
             quality_text
             if step is None
@@ -144,7 +144,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"{start_text}: {_format_offer_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
+        return f"{quality_text}; no other td in the range {'is better' if small else _NOT_HALVED}"
     distance = _describe_distance(start, step, unit)
     error_change = _describe_error_change(start, step)
     cost_change = _describe_cost_change(start, step)
@@ -171,6 +171,19 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 ))  # fmt: skip
 
 
+def _explain_why_no_pair(trade_off: TradeOff) -> str:
+    """Explain why no td has a pair by the td of the highest energy, of which most could be kept."""
+    if not trade_off.offers:
+        return "no td in the range has an admissible tr"
+    highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
+    return f"no td in the range has an admissible tr; td = {highest.td:.6g}: {highest.answer.why_none}"
+
+
+def _describe_longest(start: Offer) -> str:
+    """Return in which respect the td from which the comparison starts exceeds the others."""
+    return "is rigid for longest" if start.saving is None else "saves the most CPU time"
+
+
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
     """Return how far the other td is away, and its value."""
     apart = step.td - start.td
@@ -182,7 +195,7 @@ def _describe_error_change(start: Offer, step: Offer) -> str:
     """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
-        return "brings the level below twice the mean energy"
+        return "brings the energy at td below twice its mean"
     assert step.error is not None
     halves = _HALF[0] * start.error <= step.error <= _HALF[1] * start.error
     return f"{'halves the error' if halves else 'cuts the error'} to {step.error:.3f}"
@@ -193,8 +206,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no processor time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's processor time"
+            return "costs no CPU time"
+        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's CPU time"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -208,7 +221,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 def _format_offer_error(offer: Offer) -> str:
     """Return the error of an offer with its name."""
     if offer.error is None:
-        return "a level above twice the mean energy"
+        return "an energy above twice its mean"
     if offer.basis == "energy":
         return (
             f"error {tables.format_measure(offer.error)} (shortfall of the level at td)"
@@ -266,7 +279,7 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "kinetic fraction": lambda offer: tables.format_measure(offer.kinetic_share),
     "rigid for": lambda offer: offer.rigid_time,
     "of simulated time": _make_getter_of_best("rigid_fraction", ".1%"),
-    "processor time": _make_getter_of_best("run_time_share", ".0%"),
+    "CPU time": _make_getter_of_best("run_time_share", ".0%"),
     "timing tolerance": _make_getter_of_best("timing_tolerance", ".1e"),
     "verdict": lambda offer: (
         format_in_short(offer.decision) if offer.decision else offer.answer.why_none

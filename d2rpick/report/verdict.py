@@ -115,7 +115,7 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
         ("kinetic fraction at td", tables.format_if_known(answer.kinetic_share, ".3f")),
-        ("lock-in error", tables.format_if_known(best.lock_in_error, ".3f")),
+        ("frozen-deformation error", tables.format_if_known(best.lock_in_error, ".3f")),
         ("residual, expected", tables.format_if_known(best.residual, ".3f")),
         ("residual, lowest", tables.format_if_known(best.residual_low, ".3f")),
         ("residual, highest", tables.format_if_known(best.residual_high, ".3f")),

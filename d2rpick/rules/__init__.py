@@ -127,8 +127,8 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
     near = near or difflib.get_close_matches(wanted, rule_ids, n=1, cutoff=_ALIKE)
     text = "an id like D2R101 or its beginning was expected"
     if near:
-        text += f"; did you mean {near[0]}?"
-    return text
+        return f"{text}; did you mean {near[0]}?"
+    return f"{text}; d2rpick rule lists all"
 
 
 def _count_differences(first: str, second: str) -> int:

@@ -279,12 +279,12 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
+    situation, decision = verdict.situation, verdict.decision
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
     if not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
-    situation, decision = verdict.situation, verdict.decision
     if verdict.admissible and not decision.reaches(situation.settings.min_quality):
         what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
         yield Fault("D2R209", False, what)
@@ -354,12 +354,12 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     if situation.at_rest:
         return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
     if candidate.sign_match is False:
-        quantity = "the deformation at tr has the opposite sign of that at td"
+        quantity = "at tr the deformation has the opposite direction"
         yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
         return
     if candidate.lock_in_error is not None:
         error = candidate.lock_in_error
-        quantity = "lock-in error"
+        quantity = "frozen-deformation error"
     elif candidate.level_error is not None:
         error = candidate.level_error
         quantity = "level error"

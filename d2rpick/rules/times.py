@@ -449,7 +449,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0122659", "0.064"))
 @make_rule_decorator(
-    "D2R202", ERROR, "the deformation at tr has the opposite sign of that at td", BOTH
+    "D2R202", ERROR, "at tr the deformation has the opposite direction", BOTH
 )
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the

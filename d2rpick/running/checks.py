@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits
 
 
-NO_CONTACT: Final = "no contact and no rigid wall, so nothing would end a flight"
+NO_CONTACT: Final = (
+    "the deck has no contact and no rigid wall, so nothing would end a flight"
+)
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:

@@ -130,7 +130,7 @@ def alone(folder: Path) -> Iterator[None]:
     lock = _lock(folder / ".drive.lock")
     if lock is None:
         raise D2RPickError(
-            f"{folder}: another d2rpick drives this run; wait for it, or choose another folder"
+            f"{folder}: another d2rpick drives this run; wait for its end, or choose another folder"
         )
     try:
         yield
@@ -189,7 +189,7 @@ class Solver:
         lock = _lock(self._lock_path)
         if lock is None:
             raise D2RPickError(
-                f"{self.folder}: a solver is at work there; wait for its end"
+                f"{self.folder}: a solver is running there; wait for its end"
             )
         try:
             _raise_stack_limit()
@@ -248,7 +248,7 @@ class Solver:
         return b"NORMAL TERMINATION" in _read_tail(self.file(number, ".out"))
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Return cycles and processor time [s] of a leg; None if its listing does not contain them."""
+        """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
         listing = _read_tail(self.file(number, ".out"))
         cycles, seconds = _CYCLES.findall(listing), _TOTAL.findall(listing)
         return (
@@ -328,7 +328,7 @@ class Solver:
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
-                f"{self.folder}: leg {number} may need {needed / 1e6:.3g} MB, {free / 1e6:.3g} MB are free; "
+                f"{self.folder}: engine run {number} may need {needed / 1e6:.3g} MB, {free / 1e6:.3g} MB are free; "
                 "make room, then --resume"
             )
 

@@ -81,10 +81,12 @@ def _describe_rigid_times(
     for start, seen_at, end in rigid_times:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
             continue
-        message = "parts have become rigid: no quantity of a part is believed until they deform again"
+        message = (
+            "parts have become rigid: part data are not used until they deform again"
+        )
         yield Event("rigid", start, seen_at, message)
         if end < history.time[-1]:
-            yield Event("deformable", end, end, "no part is rigid any more")
+            yield Event("deformable", end, end, "all parts deform again")
 
 
 def _describe_flight(
@@ -110,16 +112,18 @@ def _describe_flight(
 
 def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
     """Report that a flight is seen, by what evidence, and why it was not seen before."""
-    quantity = "the energy of the contacts"
+    quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
     wait = motion.wait(flight.start, flight.seen)
-    reason = f"the wait is {flight.wait:.4g}: {wait.reason}" if wait else ""
-    landing = "nothing tells when it lands"
+    reason = (
+        f"required force-free time {flight.wait:.4g}: {wait.reason}" if wait else ""
+    )
+    landing = "landing time unknown"
     if flight.level is not None:
-        landing = f"on level ground it lands about {flight.level:.4g}"
+        landing = f"on level ground it lands at about {flight.level:.4g}"
     evidence = (
-        f"{quantity} is constant within {flight.left:.1e} of its largest value"
+        f"{quantity} is constant within {flight.left:.1e} of its maximum"
         f" for {flight.seen - flight.start:.4g}"
     )
     message = "; ".join(filter(None, (evidence, reason, landing)))
@@ -132,7 +136,7 @@ def _suggest_switch(
     """Advise when to switch in a flight."""
     wait = motion.wait(flight.start, flight.seen)
     if wait and wait.source == "at-rest":
-        message = "switch now: nothing vibrates, so that any tr is right, and the earlier it is the more it saves"
+        message = "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
         now = flight.seen
         yield Event("switch", now, now, message, flight.wait, tr=now)
     else:
@@ -145,7 +149,7 @@ def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
         low, high, enough = range_of_energy(history, now, flight.wait)
-        level = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
+        level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
         if flight.end is not None and now >= flight.end:
             return
         if energy >= enough:
@@ -153,16 +157,14 @@ def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event
             yield Event("switch", now, now, message, flight.wait, tr=now)
             return
         if now == flight.seen:
-            message = (
-                f"not yet: {level}; its highest value is waited for until {last:.6g}"
-            )
+            message = f"not yet: {level}; waiting until {last:.6g} for its maximum"
             yield Event("later", last, now, message, flight.wait)
     is_over = flight.end is not None and flight.end <= last
     if history.time[-1] > last and not is_over:
         tr = highest_energy(history, flight.seen, last)
         now = float(history.between(last, history.time[-1])[0][0])
         message = (
-            f"the internal energy was highest at {tr:.6g}: a restart from before can switch there"
+            f"the internal energy was highest at {tr:.6g}: restart from an earlier state to switch there"
             f"{_warn_of_swing(history, flight, tr)}"
         )
         yield Event("switch", tr, now, message, flight.wait, tr=tr)

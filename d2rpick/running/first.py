@@ -51,25 +51,25 @@ _STEPS_PER_WAIT: Final = 300
 _DELAYS_PER_WAIT: Final = 100
 # Radioss: loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
-_UNSEEN: Final = "pushes without a contact, so that a flight is not seen by contacts"
+_UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
 _OF_ALL: Final = (
-    "A first run: no reference tells the level at td, so that none is matched.",
-    "Only forces of contacts are seen: nothing else may act on the parts but gravity.",
+    "A first run: without a reference run the energy at td is unknown, so tr is not matched to it.",
+    "Only contact forces are monitored: apart from gravity, nothing else may act on the parts.",
 )
 _OF_RADIOSS: Final = (
-    "Each deformable leg ends when no contact has had a force for the wait.",
-    "No window keeps a margin: each rigid leg ends in the first step of a contact, {cap:g} at most into it.",
-    "A contact of the parts with themselves counts: while it pushes, they do not fly.",
-    "Legs behind the end of the run take one step.",
+    "Each deformable engine run ends when no contact has had a force for the force-free time.",
+    "No window keeps a margin: each rigid engine run ends in the first step of a contact, at most {cap:g} into it.",
+    "A contact of the parts with each other counts too: while it has a force, they do not fly.",
+    "Engine runs after the end of the run take one step.",
 )
 _OF_WALLS: Final = (
-    "A rigid body that meets a rigid wall in the last step of its leg is stopped in that step: in a computed run it had"
-    " a momentum of 511 after it, for 365 deformable. drive keeps a margin before it."
+    "A rigid body that meets a rigid wall in the last step of its engine run is stopped in that step: in a test it had"
+    " a momentum of 511 afterwards, a deformable body 365. d2rpick drive keeps a margin before the wall."
 )
 _OF_LS_DYNA: Final = (
-    "CODE 2 has no wait: parts become rigid without force after TIME1, also before a push and between two of them.",
-    "Other contacts, rigid walls and loads are not seen by these switches.",
-    "These cards were not tried with the solver.",
+    "CODE 2 has no force-free time: after TIME1, zero force makes parts rigid, even between two pulses.",
+    "These switches do not react to other contacts, rigid walls and loads.",
+    "These cards were not tested with the solver.",
 )
 # LS-DYNA: loads that act without a contact, and those of them that are gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
@@ -137,8 +137,8 @@ def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     period = find_inner_period(inventory)
     if period is None:
         raise ArgumentError(
-            f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
-            " without force that counts as flight, above half of the longest inner period"
+            f"`wait` cannot be derived from {path} (no masses on linear springs found); give the force-free time that"
+            " marks a flight: more than half of the longest natural period of the parts"
         )
     half = float(f"{period.time / 2:.3g}")
     return Wait(
@@ -173,7 +173,7 @@ def _make_radioss_card(
     files = _write_legs(run, bodies, sensors, largest_step, at_rest=at_rest)
     reason = _explain_wait(wait)
     if at_rest:
-        reason = f"at rest in free fall: rigid from 0; then {reason}"
+        reason = f"in free fall from rest: rigid from 0; then {reason}"
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
     of_walls = (_OF_WALLS,) if run.starter.named("RWALL") else ()
     notes = (reason, *bodies.notes, *_OF_ALL, *of_radioss, *of_walls)
@@ -269,7 +269,7 @@ def _write_legs(
 
 def _explain_wait(wait: Wait) -> str:
     """Return the note on the wait."""
-    return f"flight is {wait.time:.4g} without force: {wait.reason}"
+    return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 
 # LS-DYNA.
@@ -294,12 +294,10 @@ def _make_ls_dyna_card(
         "INITIAL_VELOCITY"
     )
     if after is None and falls_from_rest:
-        notes.append("At rest in free fall: rigid from 0, TIME1 0.")
+        notes.append("In free fall from rest: rigid from 0, TIME1 0.")
     notes += [*_OF_ALL, *_OF_LS_DYNA, offset_note]
     if after is None and not falls_from_rest:
-        notes.append(
-            "TIME1 is 0: give the time of the last push (--after) where it is known."
-        )
+        notes.append("TIME1 is 0: if you know the end of the load, give it (--after).")
     delay = wait.time / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
     lines += write_header(

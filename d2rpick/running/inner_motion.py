@@ -376,7 +376,7 @@ class InnerMotion:
             self._least.time if self._least else 0.0
         ):
             return self._least
-        reason = f"{longest.name} took {longest.half:.3g} for half a period that was over at {longest.over:.6g}"
+        reason = f"{longest.name} took {longest.half:.3g} for half a period, until {longest.over:.6g}"
         return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
@@ -441,8 +441,8 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
     shortest = longest.time if longest.least is None else longest.least
     if shortest and given < _EXACT * shortest:
         raise RangeError(
-            f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a period that is known: {longest.reason}; "
-            "a gap in the load would pass for flight"
+            f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a known period: {longest.reason}; a gap in the "
+            "load would be treated as flight, so give a longer one"
         )
 
 

@@ -140,7 +140,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed leg, with its ``cycles`` and processor time ``cpu`` [s], None if its listing does not contain them."""
+    """A computed leg, with its ``cycles`` and CPU time ``cpu`` [s], None if its listing does not contain them."""
 
     order: Order
     findings: LegFindings
@@ -198,7 +198,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order = _follow_load(legs, limits)
     if order and order.number > _MOST_LEGS:
         raise D2RPickError(
-            f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`"
+            f"the run needs more than {_MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
         )
     return order
 
@@ -306,7 +306,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     td = max(leg_ends, default=td)  # no leg for less than two states
     reason = _explain_too_little_saved(legs, td - tr, limits)
     if not findings.idle and flight < _SWINGS * findings.swing:
-        reason = f"shorter than {_SWINGS:g} half swings of {findings.swing:.3g}: its landing is not known"
+        reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
     return Window(findings.free, tr, td, contact, wait, reason)
 
 
@@ -315,7 +315,7 @@ def _explain_too_little_saved(
 ) -> str | None:
     """Say why a window does not pay for its probe and restarts; None if it does.
 
-    Cycles decide, since processor times differ each time and the same command must compute the same run.
+    Cycles decide, since CPU times differ each time and the same command must compute the same run.
     """
     if rigid_time <= 0:
         return "its margin begins before tr"

@@ -30,11 +30,11 @@ class Swing(NamedTuple):
     @property
     def told(self) -> str:
         """What the user should know before the body becomes rigid."""
-        motion, limit = "still swings against the others", "about"
+        motion, limit = "still moves relative to the others", "about"
         if self.at_most:
-            motion, limit = "swings against the other, or both turn", "at most"
+            motion, limit = "moves relative to the other, or both rotate", "at most"
         return (
-            f"{self.name} {motion}: at td the body may be off by {limit} {self.error:.3g},"
+            f"{self.name} {motion}: at td the body may be out of place by {limit} {self.error:.3g},"
             f" more than {MOST_OF_PATH:.0%} of its path in a flight shorter than {self.flight:.3g}"
         )
 

@@ -34,7 +34,7 @@ _SHORTEST, _LONGEST = 0.5, 5.0
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
-    "neither a momentum nor the energy of contacts is written: nothing tells when a force acts; let the run write them "
+    "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
 )
 
@@ -109,7 +109,7 @@ class Watch:
     def state(self) -> Event:
         """Return whether the parts fly now, and since when."""
         if not self._events and self._last_time == float("-inf"):
-            message = "has not begun"
+            message = "no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
@@ -124,7 +124,9 @@ class Watch:
             f"no flight since {events[-1].time:.6g}" if events else "no flight yet"
         )
         if self._wait_unknown:
-            message += "; nothing tells how long no force must act to count as flight: give `wait`"
+            message += (
+                "; the force-free time that marks a flight is unknown: give `wait`"
+            )
         return self._make_event("state", message)
 
     def _read(self, names: Sequence[str], *, rewritten: bool) -> Iterator[Event]:
@@ -146,7 +148,7 @@ class Watch:
         events = find_events(self._evidence, self._motion, self._decided)
         reported = self._events
         if self._last_time == float("-inf"):
-            message = f"the run has come to {now:.6g}"
+            message = f"the run has reached {now:.6g}"
             yield Event("begun", float(time[0]), now, message)
         elif rewritten or now < self._last_time:
             pairs = zip(reported, events, strict=False)
@@ -165,14 +167,12 @@ class Watch:
 
     def _report_restart(self, kept_count: int, now: float) -> Iterator[Event]:
         """Report that a run went back, and when the contact is expected that it had after ``now`` before."""
-        message = f"the run was restarted: it was at {self._last_time:.6g}, and is at {now:.6g}"
+        message = f"the run was restarted: it was at {self._last_time:.6g} and is now at {now:.6g}"
         yield Event("restart", now, now, message)
         for event in self._events[kept_count:]:
             if event.event == "contact":
                 if event.time is not None and event.time > now:
-                    message = (
-                        "a contact is expected there: before the restart it came there"
-                    )
+                    message = "a contact is expected there, as before the restart"
                     yield Event("expected", event.time, now, message)
                 return
 

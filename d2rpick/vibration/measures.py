@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     # tr and td [-].
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
-# Growth of the lock-in error that ``timing_tolerance`` allows.
+# Growth of the frozen-deformation error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
 # By so many damping ratios R^2 depends on the phases at td, at most by two.
 _PHASES_COUNT = 1.5
@@ -322,7 +322,7 @@ def vertices(
 
 
 class Profile(NamedTuple):
-    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
+    """Frozen-deformation errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
 
     time: Samples
     error: Samples

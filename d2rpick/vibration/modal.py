@@ -306,7 +306,7 @@ class ModalVibration:
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
-        """Return lock-in errors at those of ``time`` before ``td``, from values computed once for all td."""
+        """Return frozen-deformation errors at those of ``time`` before ``td``, from values computed once for all td."""
         last = int(np.searchsorted(self.time, td))
         elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2

@@ -60,8 +60,8 @@ _NAMED = 5
 class Compared(NamedTuple):
     """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
 
-    ``profile`` returns their lock-in error before a td; it is None for one mode, which has a closed form.  ``band`` is
-    that of a residual.
+    ``profile`` returns their frozen-deformation error before a td; it is None for one mode, which has a closed form.
+    ``band`` is that of a residual.
     """
 
     deformation: Deformation
@@ -147,7 +147,7 @@ class Vibration:
 
     @cached_property
     def profile(self) -> Profile | None:
-        """Return the lock-in error before td, whose minima are closest matches; None if there are none."""
+        """Return the frozen-deformation error before td, whose minima are closest matches; None if there are none."""
         if self.compared is None or self.compared.profile is None:
             return None
         return self.compared.profile(self.td)
@@ -170,7 +170,7 @@ class Vibration:
 
     @property
     def most_lock_in(self) -> float | None:
-        """Return the largest useful lock-in error of a tr, for a vibration of many modes; None for others [-]."""
+        """Return the largest useful frozen-deformation error of a tr, for a vibration of many modes; else None [-]."""
         if self.basis != "modal":
             return None
         least_residual = self.least_residual or 0.0
@@ -228,7 +228,7 @@ class Vibration:
     def errors(self, times: Samples) -> Samples:
         """Return the errors that a tolerance limits, of the shape of ``times``; infinite if none would help [-].
 
-        The lock-in error if signs are known (for a few modes only if they match), else the level error.
+        The frozen-deformation error if signs are known (for a few modes only if they match), else the level error.
         """
         if self.compared is None:
             errors = measures.level_error(
@@ -556,6 +556,7 @@ def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
     states = count_samples_per_period(time, fit.mode)
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
+    text = f"the energy has {states:.3g} states per period"
     return (
-        f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+        f"{text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
     )

@@ -99,7 +99,7 @@ class Swings(SignedAmplitudes):
         )
 
     def profile(self, td: float) -> Profile:
-        """Return lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return frozen-deformation errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td

@@ -486,7 +486,7 @@ def _list_remarks(
 ) -> Iterator[str]:
     """Yield notes on a tr that do not concern its acceptance."""
     if not (measured or situation.vibration.unknown or situation.at_rest):
-        yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
+        yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
     if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         # imported here: a table has no parts
         from d2rpick.vibration.part_signs import (
@@ -497,9 +497,9 @@ def _list_remarks(
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:
-        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {measured['timing_tolerance']:.2g}"
+        yield f"tr is known only to ±{reach:.2g}, but its timing tolerance is ±{measured['timing_tolerance']:.2g}"
     if not measured and reach >= situation.history.step:
-        yield "the level lies within the sampling error of an extremum"
+        yield "the target energy is within the sampling error of an extremum"
 
 
 def _describe_position(worst: Off | None) -> dict[str, Any]:

@@ -39,8 +39,11 @@ def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     ):
         return
     oftener = list_names([name for name in _OFTENER if name != history.energy_format])
-    text = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
+    text = (
+        f"{states} states of the {history.energy_format} up to td = {td:.6g} are too few to show how the "
+        "energy oscillates"
+    )
     yield Caution(
         "few-states",
-        f"{text}, so its level at td is unsure; name what was written more often: {oftener}",
+        f"{text}, so the energy at td is uncertain; name a file with more states: {oftener}",
     )

@@ -193,11 +193,11 @@ class Cause(NamedTuple):
 
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
-    "write the momenta of the parts (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
+    "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
 )
 _UNKNOWN_LOAD: Final = Cause(
-    "momentum or energy changes in the flight, by gravity or by another load",
-    "give the deck of the run as `deck`, which defines gravity and loads, or write the momenta of the parts",
+    "gravity or another load changes momentum or energy in the flight",
+    "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
 )
 
 
@@ -313,7 +313,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(
-        f"how the deformations at tr and td lie to each other is unknown{why}",
+        f"it is unknown whether the parts are deformed in the same direction at tr and td{why}",
         f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
     )
 
@@ -321,11 +321,11 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
-        return "name the parts to be switched with `parts`, if the files have parts"
+        return "name the parts to be switched with `parts`, if the files contain parts"
     other_parts = situation.together.not_chosen.parts
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
-        return f"name all parts that vibrate together with `parts`: {names} as well"
+        return f"name all parts that vibrate together with `parts`, here also {names}"
     return "write the energies more often"
 
 
@@ -334,10 +334,10 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
-        return Cause(reason, "choose another tr or td, as d2rpick explore lists them")
+        return Cause(reason, "choose another tr or td (d2rpick explore lists them)")
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "choose another td, as d2rpick explore lists them",
+        "choose another td (d2rpick explore lists them)",
     )
 
 
@@ -351,7 +351,7 @@ def _list_causes_of_record(
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
         causes.append(
             Cause(
-                "the record falls below zero, as no internal energy does",
+                "the energy becomes negative, which an internal energy never does",
                 "name the internal energy with `energy` or `parts`",
             )
         )
@@ -360,7 +360,7 @@ def _list_causes_of_record(
         states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
-                f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+                f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
                 "write the energies more often",
             )
         )
@@ -377,7 +377,7 @@ def rate_certainty_of_tr(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Return True if the lock-in error may exceed that of a good pair, within the accuracy of tr."""
+    """Return True if the frozen-deformation error may exceed that of a good pair, within the accuracy of tr."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -396,13 +396,13 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "choose another td, as d2rpick explore lists them",
+                "choose another td (d2rpick explore lists them)",
             )
         )
     elif high > _MOST_HIDDEN:
         causes.append(
             Cause(
-                f"the vibration after td may be wrong by up to {high:.0%}, since the record may hide a further mode",
+                f"the vibration after td may be wrong by up to {high:.0%}, because the record may hide a further mode",
                 _describe_cure_for_modes(situation),
             )
         )
@@ -410,7 +410,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(
-                f"tr is known to ±{reach:.1g} only, but the error grows by 0.05 within ±{best.timing_tolerance:.1g}",
+                f"tr is known only to ±{reach:.1g}, but its timing tolerance is ±{best.timing_tolerance:.1g}",
                 "write the energies more often, and with more digits",
             )
         )

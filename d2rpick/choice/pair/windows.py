@@ -87,8 +87,8 @@ def find_alike_windows(
 ) -> Samples:
     """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
 
-    The timing tolerance of a candidate is the time by which it may be off before its lock-in error grows by 0.05.  On
-    the energy alone the level error replaces the lock-in error.
+    The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
+    0.05.  On the energy alone the level error replaces that error.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
     absent = [part for part in run.parts if part.id not in ids_in_deck]
     if not difference and inventory.complete and _has_energy(run, absent):
         difference = f"{name_units(part.id for part in absent)} of the history {choose_verb(absent)} not in the deck"
-    text = f"{difference}: nothing of the deck is used; name that of the run"
+    text = f"{difference}: the deck is not used; give the deck of this run"
     return Caution("deck-of-another-model", text) if difference else None
 
 
@@ -123,14 +123,14 @@ def warn_about_bodies(
             more_ties = f" and {len(inventory.ties) - 1} more ties"
         else:
             more_ties = ""
-        ties_text = f"{inventory.ties[0]}{more_ties} may join parts that share no nodes, which is not followed"
+        ties_text = f"{inventory.ties[0]}{more_ties} may connect parts that share no nodes, which is not checked"
         yield Caution(
             "ties-not-followed",
-            f"{ties_text}; parts that are tied belong in one rigid body",
+            f"{ties_text}; put tied parts into one rigid body",
         )
-    cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
+    cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece its own part"
     if inventory.solver != "ls-dyna":
-        cure = "each of them needs a rigid body of its own"
+        cure = "give each piece its own rigid body"
     for body in find_rigid_bodies(inventory, parts):
         if not (body.whole or inventory.ties):
             lies = (
@@ -138,7 +138,7 @@ def warn_about_bodies(
             )
             yield Caution(
                 "loose-pieces",
-                f"{lies} in {count_pieces(inventory, body.parts)} pieces that nothing joins; {cure}",
+                f"{lies} in {count_pieces(inventory, body.parts)} pieces that are not connected; {cure}",
             )
 
 
@@ -163,9 +163,10 @@ def warn_about_solver(
         if part in inventory.parts and not inventory.parts[part].section.turns
     ]
     if unturned and inventory.solver == "radioss":
-        parts_text = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
+        parts_text = f"{name_units(unturned)}: the stresses of these solids do not rotate with the rigid body"
         yield Caution(
-            "stresses-unturned", f"{parts_text}; expect an error after a large rotation"
+            "stresses-unturned",
+            f"{parts_text}; expect wrong stresses after a large rotation",
         )
 
 
@@ -187,7 +188,7 @@ def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
-        taken = f"the cost of {', '.join(model.assumed)} was not measured; that of a formulation alike was taken"
+        taken = f"the cost of {', '.join(model.assumed)} was not measured; the cost of a similar formulation is used"
         yield Caution("weights-by-analogy", taken)
 
 
@@ -241,9 +242,9 @@ def add_deck_to_settings(
     history = reference.history
     settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
     if not history.parts:
-        why = "no parts are named whose elements are saved; give them with `parts`"
+        why = "name the switched parts with `parts`"
         if settings.cost_share is None:
-            open_ = [Caution("cost-unknown", f"the run time stays open: {why}")]
+            open_ = [Caution("cost-unknown", f"the CPU time is not estimated: {why}")]
         else:
             open_ = []
         return replace(settings, bodies=()), (*doubts_of_parts, *open_)
@@ -264,7 +265,7 @@ def add_deck_to_settings(
     ]
     if share.reason:
         doubts.append(
-            Caution("cost-unknown", f"the run time stays open: {share.reason}")
+            Caution("cost-unknown", f"the CPU time is not estimated: {share.reason}")
         )
     return with_cost, tuple(doubts)
 

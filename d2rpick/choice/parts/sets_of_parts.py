@@ -57,7 +57,7 @@ _LIKE: Final = 0.01
 # The set "heavy" has at least this share of the mass of all switchable parts [-].
 _HEAVY: Final = 0.5
 _ALL, _STILL = "all that may", "all but what moves"
-_NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
+_NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotates, so the rotation error is unknown"
 
 
 class PartSet(NamedTuple):
@@ -204,9 +204,9 @@ def find_given_parts(run: OpenedRun, names: Sequence[str]) -> tuple[int, ...]:
     if not names:
         return ()
     if has_recommended(names, run.parts):
-        cure = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        cure = "name a set to compare, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(
-            f"{run.name}: the recommended set is what is looked for here; {cure}"
+            f"{run.name}: d2rpick parts itself finds the recommended set; {cure}"
         )
     numbers = replace_words_by_part_ids(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
@@ -462,7 +462,7 @@ def _warn_about_sets(
     if model is None:
         yield Caution(
             "no-deck",
-            "without a deck the cost and most verdicts stay open; name the main deck of the run",
+            "without a deck the CPU time and most verdicts are unknown; give the main deck of the run",
         )
         return
     yield from warn_about_titles(

@@ -139,7 +139,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
             run.surroundings.held([part], moment),
         )
     return RunFacts(
-        facts, spans, longest, None if flights else "no flight is seen in the history"
+        facts, spans, longest, None if flights else "no flight is found in the history"
     )
 
 
@@ -366,7 +366,7 @@ def _list_reasons_to_keep(
     if row.kind == "spring":
         yield "discrete"
         if data and data.section.damped:
-            yield "with dampers, whose work only grows in its energy"
+            yield "with dampers, whose energy contains the dissipated work"
         return
     if row.kind in ("airbag", "void", "particles"):
         yield {
@@ -383,13 +383,13 @@ def _list_reasons_to_keep(
     if fact and fact.held:
         yield fact.held
     elif fact and fact.has_energy is False:
-        yield "never any internal energy: rigid, or fixed"
+        yield "never has internal energy: rigid, or fixed"
     elif row.flight and row.flight.flies is False:
-        yield "does not fly with the rest"
+        yield "does not fly with the other parts"
     if data and not data.section.turns:
-        yield "stresses of its solids do not turn with a rigid body"
+        yield "stresses of its solids do not rotate with a rigid body"
     if row.id == alone:
-        yield "drives the landing alone, at little cost"
+        yield "determines the landing alone, and costs little"
 
 
 def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
@@ -403,7 +403,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
         return
     pieces = count_pieces(inventory, [row.id], among=inventory.parts.keys())
     if pieces > 1:
-        yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
+        yield f"{pieces} disconnected pieces, which LS-DYNA would make one rigid body"
 
 
 def _list_unknowns(
@@ -411,19 +411,19 @@ def _list_unknowns(
 ) -> Iterator[str]:
     """Yield the data that are missing to judge a part without objections."""
     if inventory is None:
-        yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
+        yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:
         yield "not in the deck"
     elif row.elements is None:
-        yield "its elements are not in what was read of the deck"
+        yield "its elements are not in the files of the deck that were read"
     elif data.material is None:
         yield "its material is not in the deck"
     if row.id not in facts.parts:
         yield facts.reason or "not in the history"
     elif row.flight is None:
-        yield facts.reason or "no flight is seen"
+        yield facts.reason or "no flight is found"
     elif row.flight.flies is None:
-        yield "no momenta of parts show whether it flies with the rest"
+        yield "no part momenta show whether it flies with the other parts"
 
 
 def _list_remarks_on_switch(
@@ -431,12 +431,12 @@ def _list_remarks_on_switch(
 ) -> Iterator[str]:
     """Yield remarks on a part that may be switched."""
     if row.kind == "rigid":
-        yield "rigid in the deck, but it has internal energy in the history"
+        yield "rigid in the deck, but has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
         yield (
-            "still vibrates in the flight, so tr matters"
+            "flies and still vibrates, so tr matters"
             if row.flight.deforms
-            else "has stopped deforming"
+            else "flies and no longer vibrates"
         )
     if data and data.section.formulations.keys() & {
         "solid",
@@ -444,7 +444,7 @@ def _list_remarks_on_switch(
         "pentahedron",
         "thick shell",
     }:
-        yield "solids: solvers may misreport their energy while they are rigid"
+        yield "solids: some solvers report wrong energies for them while they are rigid"
     if fact and fact.has_energy is None:
         yield "its energy is not written"
 

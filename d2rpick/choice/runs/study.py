@@ -361,14 +361,15 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             f"{len(cut)} of {format_number_of_runs(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
-        text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
+        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
         yield Caution(
-            "timing-tolerance", f"{text}: the error of a run grows by more than 0.05"
+            "timing-tolerance",
+            f"{text}: in at least one run the error grows by more than 0.05",
         )
     for code, sentence, kinds in (
         (
             "mixed-units",
-            "the times of the runs have different units, td has only one",
+            "the runs have different units of time, but td has only one",
             [row.time_unit for row in judged],
         ),
         (
@@ -477,12 +478,12 @@ def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
             which = f"any of {format_number_of_runs(len(judged))}"
         else:
             which = "the run that was judged"
-        return f"no tr is acceptable in {which}"
+        return f"no tr is admissible in {which}"
     tr = find_fewest_digits(*stretches[np.argmax(counts)])
     unsuited = [row.source for row in judged if not _is_in_windows(row.acceptable, tr)]
     suited = len(judged) - len(unsuited)
     return (
-        f"no tr is acceptable in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
+        f"no tr is admissible in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
         f"not in {list_names(unsuited, most=NAMED)}"
     )
 

@@ -183,8 +183,10 @@ def compare_runs(
     if energies_before.size and _is_reported_wrong(
         energies_before[-1], energies_to_end
     ):
-        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, at td {frozen:.6g} came back"
-        notes.append(f"{reported}; some solvers report rigid solid elements wrongly")
+        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, after td one of {frozen:.6g}"
+        notes.append(
+            f"{reported}; some solvers report wrong energies of rigid solid elements"
+        )
     still = _find_limit_of_change(reference, switched, tr, td)
     error = _compute_relative_distance(*momenta, td, end)
     rigid = _find_rigid_window(switched, tr, td, still)
@@ -197,8 +199,10 @@ def compare_runs(
         if mean_reference > round_off(reference):
             objections += _check_mean_energy(mean / mean_reference, min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
-        moved = f"the switched run's momentum after td is off by {error:.1%}"
-        objections.append(f"{moved}: its motion differs from the reference")
+        moved = f"the momentum of the switched run after td differs by {error:.1%}"
+        objections.append(
+            f"{moved} from that of the reference run, so it moves differently"
+        )
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -228,10 +232,12 @@ def _check_number_of_states(
         last = float(short.time[-1])
         if last <= td:
             raise RangeError(
-                f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
+                f"{name}: ends at {last:g}, not after td {td:g}; give the later restart segments too"
             )
         states_text = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{name}: {states_text}; too few to compare the runs")
+        raise RangeError(
+            f"{name}: {states_text}; at least 3 are needed to compare the runs"
+        )
 
 
 def _find_limit_of_change(
@@ -286,7 +292,7 @@ def _check_rigid_window(
         return
     room = 2 * switched.step
     if rigid[1] - rigid[0] <= room < td - tr:
-        yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
+        yield f"the energy of the switched run is not constant from tr {tr:g} to td {td:g}: was it switched?"
         return
 
     def lasts_longer(start: float, end: float) -> bool:
@@ -300,7 +306,7 @@ def _check_rigid_window(
         or lasts_longer(rigid[0], tr)
         or lasts_longer(td, rigid[1])
     ):
-        rigid_text = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        rigid_text = f"the energy of the switched run is constant from {rigid[0]:.6g} to {rigid[1]:.6g}"
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
@@ -314,18 +320,18 @@ def _check_locked_in_energy(
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
         yield (
-            f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
+            f"the energy after td, {frozen:.6g}, is not the energy of the reference run at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
     if measures.level_error(frozen, energy_td) > tolerance:
-        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {energy_td:.6g}"
+        yield f"the frozen energy, {frozen:.6g}, differs from the energy of the reference run at td, {energy_td:.6g}"
 
 
 def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not min_mean <= share <= 2 - min_mean:
         mean_text = (
-            f"the mean energy after td is {share:.2g} times that of the reference"
+            f"the mean energy after td is {share:.2g} times that of the reference run"
         )
         yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
 
@@ -379,9 +385,12 @@ def _explain_why_no_times(
     if np.array_equal(switched.time, reference.time) and np.array_equal(
         switched.energy, reference.energy
     ):
-        return "the energies of the switched run and of the reference run are the same"
+        return "both runs have the same energies, so it may be the reference run again"
     if not spans:
-        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
+        return (
+            f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid; "
+            "was it switched?"
+        )
     first, last = spans[0]
     start, end = switched.time[first], switched.time[last]
     return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"

@@ -97,13 +97,19 @@ class DoneWindow(NamedTuple):
     def description(self) -> str:
         """Sentence for the user on what became of the window."""
         if self.flight is None:
-            return "no flight is seen there"
+            return "no flight is found there"
         if self.took_off is not None:
-            return f"took off at {self.took_off:.6g}, {self.took_off - self.tr:.3g} after tr: rigid in the contact"
+            return (
+                f"took off at {self.took_off:.6g}, {self.took_off - self.tr:.3g} after tr: the parts were "
+                "rigid in the contact"
+            )
         if self.landing is None:
-            return "no landing was seen after it"
+            return "no landing is found after it"
         if self.landed_rigid:
-            return f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: rigid in the contact"
+            return (
+                f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: the parts were "
+                "rigid in the contact"
+            )
         landed = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
         if self.moved is None:
             return landed
@@ -271,16 +277,18 @@ def _warn_about_deforming(
             if not is_rigid
         ]
         if names and history.parts:
-            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {list_names(names)}"
+            deforming = (
+                f"from {tr:.6g} to {td:.6g} these parts deform: {list_names(names)}"
+            )
             yield Caution(
-                "partly-rigid", f"{deforming}; the window counts as done for the others"
+                "partly-rigid", f"{deforming}; for the others the window is done"
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
         return  # a free fall looks the same
     where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
     raise RangeError(
-        f"{where}, a window that is said to be done; give the run that was switched so"
+        f"{where}, a window that `done` names; give the run that was switched in it"
     )
 
 
@@ -297,9 +305,9 @@ class _AbsentWindow(NamedTuple):
         """Warning about the rigid parts of the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
-            window_text = f"the parts were rigid {when}, give or take an output interval: taken as done"
+            window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
             return Caution("rigid-times", window_text)
-        window_text = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
+        window_text = f"{when} these parts were rigid: {self.rigid}; the others deform, so the window is not done"
         return Caution("partly-rigid", window_text)
 
 
@@ -447,12 +455,12 @@ def _choose_compared_parts(
     if not comparable:
         energies_text = f"the energies of {_list_part_names(misreported)}"
         objections.append(
-            f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
+            f"{energies_text} are wrong after td, so only the motion can be compared"
         )
     elif misreported:
         left_out = f"left out of the comparison: {_list_part_names(misreported)}"
         notes.append(
-            f"{left_out}, whose energy is reported wrongly after td; some solvers do so with solids that were rigid"
+            f"{left_out}, whose energy is wrong after td, as some solvers report it for solids that were rigid"
         )
     selection = Selection(
         parts=tuple(str(part.id) for part in comparable or chosen),

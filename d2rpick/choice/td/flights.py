@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # Places in the record at which a continuing vibration is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-_NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
+_NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
 
 def find_longest_flight(
@@ -49,13 +49,13 @@ def find_longest_flight(
         held = history.surroundings.held(history.parts, float(history.time[-1]))
         if held:
             reason = held
-            cure = "only what nothing holds can be switched"
+            cure = "name parts that nothing holds"
         elif settings.after is not None:
             reason = _NO_FLIGHT
             cure = "give `td`"
         else:
             reason = _NO_FLIGHT
-            cure = "give the end of the load as `after` where it is known"
+            cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(

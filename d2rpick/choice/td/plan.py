@@ -252,10 +252,10 @@ def _list_rows(
             for done in done_in_flight:
                 yield row._replace(status="done", reason=done.description, done=done)
         elif last is not None and start < last:
-            yield row._replace(reason="before the last window that is done")
+            yield row._replace(reason="before the last window that the run has done")
         elif settings.after is not None and end <= settings.after:
             yield row._replace(
-                reason=f"the load ends after it, at {settings.after:.6g}"
+                reason=f"before the end of the load at {settings.after:.6g} (`after`)"
             )
         elif end - margin.time - start < shortest:
             yield row._replace(
@@ -324,7 +324,7 @@ def _suggest_window(
 def _explain_grade(decision: Decision, pair: Pair) -> str:
     """Explain why a pair is not planned, and how to plan it nevertheless."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
-    advice = f"with `min_quality` {decision.grade} it is planned all the same"
+    advice = f"with `min_quality` {decision.grade} it is planned nevertheless"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
 
 
@@ -334,7 +334,10 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
         margin_text = f", with the margin {margin.time:.3g} before the contact"
     else:
         margin_text = ""
-    return f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}, at least {shortest:.3g} was asked for"
+    return (
+        f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
+        f"{shortest:.3g} (`min_rigid`)"
+    )
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
@@ -354,10 +357,15 @@ def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
-        longer = f"flight {longest_after.number} behind it for {longest_after.rigid_time:.3g}"
+        longer = (
+            f"flight {longest_after.number} after it for {longest_after.rigid_time:.3g}"
+        )
         window_text = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
-        why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
-        cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
+        why = (
+            "this window freezes vibration energy and shifts the later landings, so that flight would "
+            "need a further run"
+        )
+        cure = f"with `min_rigid` below {rigid:.6g} this window is planned too"
         yield row._replace(status="left-out", reason=f"{window_text}: {why}; {cure}")
 
 
@@ -369,7 +377,7 @@ def _mark_status(
     why = ""
     if in_contact:
         window = f"the window {in_contact.tr:.6g} to {in_contact.td:.6g}"
-        why = f"the run was rigid in a contact in {window}; plan the windows from there again"
+        why = f"the run was rigid in a contact in {window}; plan the windows from there on again"
     for row in rows:
         if row.status == "supported" and why:
             yield row._replace(status="re-plan", reason=why)
@@ -377,8 +385,8 @@ def _mark_status(
         yield row
         if row.status == "supported" and row.locks_in and row.window:
             tr, td = row.window
-            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which moves the landings after it"
-            why = f"{moved}; plan this one from a run that was switched in that window"
+            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which shifts the later landings"
+            why = f"{moved}; plan this window from a run that is switched in that one"
 
 
 def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
@@ -399,7 +407,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
         and longest.rigid_time > first.rigid_time
     ):
         text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
-        cure = "with a minimal rigid time between the two it would be supported instead"
+        cure = "with `min_rigid` between the two the longer one is planned instead"
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
@@ -424,4 +432,4 @@ def _warn_about_windows(
             yield caution._replace(message=which + caution.message)
     yield from _warn_about_blocked(rows)
     if not rows:
-        yield Caution("no-flight", "nothing in the record shows a flight")
+        yield Caution("no-flight", "no flight is found in the record")

@@ -494,7 +494,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest lock-in error of a tr between two times [-], and that tr [time]; infinite for none."""
+    """Return the smallest frozen-deformation error of a tr between two times [-], and that tr [time]; else infinity."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:

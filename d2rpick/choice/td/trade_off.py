@@ -337,10 +337,10 @@ def _warn_about_window(
         kept_clear = window[1] - inside[1]
         yield Caution(
             "margin-kept",
-            f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
+            f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
         )
     if not any(map(_is_comparable, offers)):
-        nothing = "no td in the window has an acceptable tr that saves anything"
+        nothing = "no td in the range has an admissible tr"
         yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
 
 

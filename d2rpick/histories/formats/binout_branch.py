@@ -86,7 +86,7 @@ def _find_damages(
         yield f"{where} has {doubled[0]} twice in one state"
     variable_sets = {frozenset(layout.variables) for layout in layouts}
     if (steps < 1).any() and len(variable_sets) > 1:
-        yield f"{where} begins a new leg whose states have other variables"
+        yield f"{where} begins a new restart segment whose states have other variables"
 
 
 def _group_states(

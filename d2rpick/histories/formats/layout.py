@@ -164,6 +164,8 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     below = "below" if text.is_short else f"in the first {HEAD} lines"
     problem = f"{text.name}:{number}: {quote_start(line)} and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
+    if rows and has_number(line.strip(), ".", ""):
+        cure = "this file has one column; add the times"
     return FormatError(f"{problem}; expected a table of time and energy; {cure}")
 
 

@@ -118,7 +118,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     legs = [history for history in histories if history.channels] or histories
     for history in histories:
         if history not in legs:
-            note = f"{history.source} was left out: without global values it is no leg of the run but an additional"
+            note = f"{history.source} was left out: without global values it is no engine run but an additional"
             legs[0].notes += (
                 f"{note} time history (/ATFILE); name it alone to use its parts",
             )
