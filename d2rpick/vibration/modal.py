@@ -581,10 +581,12 @@ def _read(
     hidden = _find_most_hidden(remainder)
     unresolved = share * mean < hidden / 2
     no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
+    if ambiguous and not all(stretch.is_exact for stretch in stretches):
+        no_static = True
     reading = plain if no_static else with_static
     other_readings: tuple[Reading, ...] = ()
     if ambiguous:
-        other_readings = (plain,)
+        other_readings = (with_static if no_static else plain,)
     elif may_be_spring and stretches:
         other_readings = (replace(with_static, is_mode=plain.is_mode),)
     elif not stretches and not kinetic:
