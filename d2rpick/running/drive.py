@@ -25,7 +25,7 @@ from d2rpick.running.sequence import (
     Order,
     choose_next_leg,
     collect_joined_legs,
-    find_window,
+    find_next_window,
     get_flight_findings,
 )
 from d2rpick.running.swing import find_swing
@@ -327,7 +327,7 @@ def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
     """Return a warning if parts swing too much in the window that the last leg ends; "" if not."""
     if legs[-1].findings.contact is None:
         return ""
-    window = find_window(legs, limits)
+    window = find_next_window(legs, limits)
     findings = get_flight_findings(legs)
     if window.reason or findings.steady_from <= window.td - window.free:
         return ""

@@ -24,7 +24,7 @@ from d2rpick.histories.formats.blocks import (
     Grammar,
     Stretch,
     count_like_example,
-    parse_numbers,
+    parse_fortran_numbers,
     read_head_of_listing,
 )
 from d2rpick.histories.resuming import ResumePoint
@@ -224,13 +224,13 @@ class Blocks(Database):
                 numbers = self._decoded(addresses)
             else:
                 fields = taken[begin:end, moving].ravel()
-                numbers = parse_numbers(fields, self._grammar.decimals)
+                numbers = parse_fortran_numbers(fields, self._grammar.decimals)
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
         """Return the numbers at these addresses, NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
-        return parse_numbers(
+        return parse_fortran_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
         )
 
