@@ -185,20 +185,20 @@ class Blocks(Database):
         The states after it tell whether the last one is whole, and which of those with the same printed time is the
         newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not whole.
         """
-        times = self.numbers([self._grammar.time])[:, 0]
-        state = times.size - 1
-        for _ in range(2):
-            earlier = np.flatnonzero(times[: state + 1] < times[state])
-            state = int(earlier[-1]) if earlier.size else 0
         first, begin, end = self._find(self._begin), self.tail, len(self._data)
+        head = self._data[: self.tail if first is None else first]
+        times = self.numbers([self._grammar.time])[:, 0]
         if times.size:
+            state = times.size - 1
+            for _ in range(2):
+                earlier = np.flatnonzero(times[: state + 1] < times[state])
+                state = int(earlier[-1]) if earlier.size else 0
             run, number = self._run_of(state)
             begin = run.start + number * run.stride
             last_run, number = self._run_of(times.size - 1)
             last_used = last_run.start + number * last_run.stride
             if self.rest is not None and last_used == self.rest.start:
                 end = last_used
-        head = self._data[: self.tail if first is None else first]
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
