@@ -1,4 +1,4 @@
-"""Find what vibrates, and how: the models of the vibration, best first.
+"""Identify the vibration: find the models that describe it, best first.
 
 Every measure of a pair (tr, td) needs the deformations at both times and how they lie to each other (`measures`).  The
 energy does not show the sign of a deformation, so a model must.  `find_models` looks for them in this order, and
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 class VibratingTogether(Protocol):
-    """What vibrates together in a flight."""
+    """The chosen parts and all parts that vibrate with them in a flight."""
 
     @property
     def complete(self) -> bool:
@@ -51,7 +51,7 @@ class VibratingTogether(Protocol):
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return its kinetic energy in the flight less that of the fall: times and energies (n,), None if unknown."""
+        """Return times and kinetic energies of the vibration in the flight, without the fall (n,); None if unknown."""
 
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 def _find_parts(
     history: History, within: Span, _: VibratingTogether
 ) -> SignedModel | None:
-    """Read the signs of single parts if their energies are written."""
+    """Determine the signs of single parts if their energies are written."""
     time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
         return None
@@ -79,7 +79,7 @@ def _find_parts(
 def _find_modal(
     history: History, within: Span, together: VibratingTogether
 ) -> SignedModel | None:
-    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
+    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if written."""
     if not together.complete:
         return None
     from d2rpick.vibration.modal import confirm_by_kinetic_energy, identify_modal
@@ -94,13 +94,14 @@ def _find_modal(
 def _find_swings(
     history: History, within: Span, _: VibratingTogether
 ) -> SignedModel | None:
-    """Count the swings of the energy, provided that they return to a common minimum."""
+    """Count the oscillations of the energy, provided that they return to a common minimum."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(*within))
 
 
-# Models by name, with the function that finds each; None for those that are found for each td in another way.
+# Models by name, with the function that finds each.
+# The function is None for models that are found for each td in another way.
 MODELS: Final[dict[str, Finder | None]] = {
     "parts": _find_parts,
     "oscillator": None,
@@ -119,7 +120,7 @@ def find_models(
     memory: Memory,
     together: VibratingTogether,
 ) -> dict[str, SignedModel]:
-    """Look for models, best first, until one tells the sign; those after the oscillator only if that is ``doubtful``.
+    """Find models, best first, until one gives the sign; after the oscillator only if it is ``doubtful``.
 
     The window ``around`` td is used, for models after the oscillator the ``flight`` if one is known, and for swings
     also the time before it, from when the energy has ``settled``.
@@ -143,14 +144,14 @@ def find_models(
 
 
 def _is_vague(model: SignedModel) -> bool:
-    """Return True if modes leave so much open that counted swings, if there are any, say more."""
+    """Return True if the modes are so uncertain that counted oscillations, if there are any, are better."""
     from d2rpick.vibration.modal import ModalVibration
 
     return isinstance(model, ModalVibration) and model.is_vague
 
 
 def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Rely on vague or doubtful modes, with a wide band, only if no other model tells the sign."""
+    """Use vague or doubtful modes, with a wide band, only if no other model gives the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:
         return found

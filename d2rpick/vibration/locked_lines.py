@@ -1,4 +1,4 @@
-"""Find lines of an energy that are locked to other lines: lines of a stretch, and harmonics of a nonlinear spring."""
+"""Find lines of an energy that are locked to others: lines of a static stretch, and harmonics of nonlinear springs."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials
 
-# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+# Smallest relevant line, relative to the strongest one, and to a partner line, and in units of its scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record.
+# Two rates are equal if they differ by less than this share of a turn over the record.
 _SAME_RATE: Final = 0.1
-# Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
+# Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# Number of strongest lines whose harmonics are searched, and their orders.
+# Number of the strongest lines whose harmonics are searched, and the orders of the harmonics.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class StretchLine(NamedTuple):
-    """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy]."""
+    """The ``line`` of a static stretch in the mode of the line ``of_mode``, and its ``energy`` [energy]."""
 
     line: int
     of_mode: int
@@ -33,7 +33,7 @@ class StretchLine(NamedTuple):
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
 ) -> tuple[StretchLine, ...]:
-    """Find the lines of modes that vibrate about a stretch, as in a spinning body.
+    """Find the lines of modes that vibrate about a static stretch, as in a rotating body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
@@ -69,7 +69,7 @@ def find_stretches(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Return the size of lines at 3 and more times the rate of a line, with locked phases, relative to it [-].
+    """Return the relative size of phase-locked lines at 3 and more times the rate of a line [-].
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
@@ -92,7 +92,7 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Return the size of a line's harmonics beyond the second, up to the first one not locked, relative to it [-]."""
+    """Return the relative size of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))
@@ -108,7 +108,7 @@ def _measure_locked_to(
         if times > 2:
             if (
                 size[line] > size[first]
-            ):  # a harmonic is never stronger than its line: these are modes
+            ):  # a harmonic is never stronger than its line, so these lines are modes
                 return 0.0
             total += float(size[line] / size[first])
     return total
@@ -120,5 +120,5 @@ def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
 
 
 def _wrap(angle: float, turn: float) -> float:
-    """Return an angle within half a turn of zero [rad]."""
+    """Return an angle between minus and plus half a turn [rad]."""
     return (angle + turn / 2) % turn - turn / 2

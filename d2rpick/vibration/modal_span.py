@@ -1,4 +1,4 @@
-"""Find where in a record the modes of one structure continue undisturbed, if nothing else shows its flight."""
+"""Find the window in which the modes of one structure continue undisturbed, if no other evidence shows a flight."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 # Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
-# Shares of the record at which windows that reach its end begin.
+# Starts, as shares of the record, of windows that end with the record.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate by less than this
-# share of the vibration energy, or this many times the scatter of such means.
+# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate little:
+# by less than this share of the vibration energy, or this many times the scatter of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
 # Most repetitions of extending and identifying a window.
 _MOST_REFITS: Final = 3
@@ -37,7 +37,7 @@ class ModalWindow(NamedTuple):
 def find_described(
     history: History, td: float, guess: Span | None, memory: Memory
 ) -> ModalWindow | None:
-    """Find a window around td whose modes go on by themselves; None if none is found.
+    """Find a window around td in which modes continue undisturbed; None if none is found.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def find_described(
 def _described_from(
     history: History, window: Span, memory: Memory
 ) -> ModalWindow | None:
-    """Grow a window whose modes go on by themselves; None if they do not.
+    """Extend a window in which modes continue undisturbed; None if they do not.
 
     What comes out depends on the window alone, not on the td that was asked for first.
     """
@@ -75,7 +75,7 @@ def _look_in(history: History, window: Span, memory: Memory) -> ModalWindow | No
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
-    """Return the whole parts of a record within a guessed window, so that guesses of many td share few windows."""
+    """Return the complete sixteenths of the record in a guessed window, so that many td share few windows."""
     first = float(history.time[0])
     last = float(history.time[-1])
     part = (last - first) / _PARTS
@@ -88,7 +88,7 @@ def get_inner_window(history: History, guess: Span) -> Span:
 
 
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
+    """Yield windows to try: the guessed one, then later ones up to the end of the record."""
     if guess is not None:
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
@@ -113,7 +113,7 @@ def _identify_window(
 def _grow_window(
     history: History, described: ModalWindow, memory: Memory
 ) -> ModalWindow:
-    """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
+    """Extend a window while the record follows its modes, identify them again, and repeat until it is constant."""
     for _ in range(_MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
@@ -126,7 +126,7 @@ def _grow_window(
 
 
 def _find_reach(history: History, found: ModalWindow) -> Span:
-    """Give the window in which the record stays with the modes, at least that in which they were found."""
+    """Return the window in which the record follows the modes, at least the one of their identification."""
     time = history.time
     energy = history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
@@ -152,12 +152,12 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Return the number of states, ordered towards the window, up to the last one that deviates from the modes."""
+    """Return the number of states up to the last one that deviates from the modes; states lead to the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(
         over="ignore", invalid="ignore"
-    ):  # far away, damped modes grow beyond all numbers
+    ):  # far from the window, damped modes overflow
         deviation = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(

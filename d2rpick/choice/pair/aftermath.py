@@ -1,4 +1,4 @@
-r"""Predict the time after td: the mean energy that a pair keeps, and its error relative to the next contact.
+r"""Predict the motion after td: the mean energy that a pair preserves, and its error relative to the next contact.
 
 An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the static
 energy S and the vibration energy U of the reference run at td, the ratio of the mean internal energies after td is
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-# Relative accuracy of vibration energies from spectral lines, swings or signs of parts [-].
+# Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest number of like modes out of step: with m of them the energy has a standard deviation of 1/sqrt(8 m) of their
-# energy. The nodes of a computed car show 100 such modes.
+# Largest number of similar modes with random phases: the energy of m modes has a standard deviation of 1/sqrt(8 m).
+# The nodes of a computed car show 100 such modes.
 _MODES_OUT_OF_STEP: Final = 110
 # Largest exponent of e, near the largest double.
 _LARGEST_EXPONENT: Final = 700.0
-# Means of computed runs exceed the prediction from spectral lines by up to this share [-].
+# Means of computed runs exceed the prediction from spectral lines by at most this share [-].
 _OF_SOLVER: Final = 0.005
-# Fewer states do not show the fluctuation.
+# Fewest states that show a fluctuation.
 _FEWEST_STATES: Final = 8
 
 
@@ -59,7 +59,7 @@ def bound_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None
     if situation.basis != "oscillator":
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
-    # parts that were not chosen may pass on their energy
+    # other parts may pass on their energy to the chosen ones
     other_energy = situation.together.beside.energy
     return Kept(
         max(low, 0.0),
@@ -97,11 +97,11 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
         return []
     time, energy = _select_energies_in_flight(situation)
     mean = float(np.mean(energy))
-    # share of the mean vibration energy of the flight that damping leaves at td
+    # share of the mean vibration energy of the flight that remains at td with damping
     exponents = -situation.flight.damping * (time - situation.td)
     decay = np.exp(np.minimum(exponents, _LARGEST_EXPONENT))
     damping_left = 1 / float(np.mean(decay))
-    # half of the vibration energy is the mean above the static energy
+    # the mean energy exceeds the static energy by half of the vibration energy
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
@@ -135,7 +135,7 @@ def _select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 
 
 class Worth(NamedTuple):
-    """Energy of the vibration error over that of the next contact, at most [-].
+    """Largest energy of the vibration error relative to that of the next contact [-].
 
     ``contact`` is the energy that the next contact puts into the parts [energy].
     """
@@ -147,7 +147,7 @@ class Worth(NamedTuple):
 def compare_error_with_contact(
     situation: Situation, candidate: Candidate
 ) -> Worth | None:
-    """Compare the vibration error of a pair with the next contact; None if that contact is unknown.
+    """Compare the vibration error of a pair with the energy of the next contact; None if unknown.
 
     The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
     opposite signs.

@@ -54,11 +54,11 @@ if TYPE_CHECKING:
 
 # Largest error of a solver's energy, as a share of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# A fluctuation below this share of the largest vibration energy since the load ended counts as none: 1 % amplitude.
+# A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
-# Printed digits: a constant energy may alternate between two printed values, each off by half a digit.
+# Rounding: a constant energy may alternate between two printed values, each off by half a digit.
 _QUANTA: Final = 2
-# Share of a flight before the contact that ends it which is not tested, since the contact may have begun [-].
+# Share of a flight before the final contact that is not tested, since the contact may have begun [-].
 _BEFORE_CONTACT: Final = 0.03
 
 
@@ -132,7 +132,7 @@ class AnswerAtTd:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Situation:
-    """A history as seen from one td [time], with the flight and the vibration around td.
+    """A history for one td [time], with the flight and the vibration around td.
 
     ``evidence`` describes the vibration that was found, ``fits`` remembers the fits that were tried.
     """
@@ -146,12 +146,12 @@ class Situation:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Model of the vibration that can be relied on at td."""
+        """Reliable model of the vibration at td."""
         return model_at(self.whole, self.evidence)
 
     @cached_property
     def whole(self) -> Vibration:
-        """Model of the vibration that the energy of all chosen parts shows."""
+        """Model of the vibration in the energy of all chosen parts."""
         return find_energy_at(self.history, self.td, self.evidence)
 
     @property
@@ -170,7 +170,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # without a vibration there is no share
+        return share  # without a vibration the fraction is undefined
 
     @property
     def earliest_tr(self) -> float | None:
@@ -188,7 +188,7 @@ class Situation:
 
     @cached_property
     def margin(self) -> float:
-        """Time kept clear before the next contact [time]; 0 for a given td without a given margin or landing."""
+        """Time kept free before the next contact [time]; 0 for a given td without a given margin or landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
@@ -200,12 +200,12 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin that a chosen td keeps: the given one, or the time by which the next contact may come earlier."""
+        """Margin of a chosen td: the given one, or the time by which the next contact may come earlier."""
         return find_margin(self.history, self.flight, self.settings, self.fits)
 
     @cached_property
     def at_rest(self) -> bool:
-        """True if nothing vibrates in the flight."""
+        """True if there is no vibration in the flight."""
         start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
@@ -230,7 +230,7 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance, for many modes less than removing the vibration."""
+        """Largest error of an acceptable tr [-]: the tolerance; for many modes also the error without any vibration."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
@@ -249,7 +249,7 @@ class Situation:
         )
 
     def sees_as(self, situation: Situation) -> bool:
-        """Return True if both situations, of one record, share the flight and the evidence, and differ in td only."""
+        """Return True if both situations belong to one record, flight and evidence, and differ in td only."""
         return (
             self.evidence.is_that_of(situation.evidence)
             and self.flight == situation.flight
@@ -294,7 +294,7 @@ def examine_td(
         history.check(settings.landing, argument="landing")
     seen_evidence = find_seen_flight(history, td)
     flying = None if seen_evidence.refusal else seen_evidence.flight
-    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
+    # if td is in no flight, the oscillator of the nearest flight shows which pairs exist there
     if seen_evidence.refusal and seen_evidence.flight:
         at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
     else:
@@ -316,7 +316,7 @@ def examine_td(
         return situation
     first = float(history.time[0])
     last = float(history.time[-1])
-    # without evidence of the next contact nothing is known about the time after td
+    # without evidence of the next contact the time after td is unknown
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
     fitted = settled = None
@@ -356,7 +356,7 @@ def make_look(
     *,
     quick: bool = True,
 ) -> Look:
-    """Return a function that examines a record at a td, and remembers its answer for each td.
+    """Return a function that examines a record at a td, and caches its answer for each td.
 
     ``fits`` are those of an earlier call with the same settings.  No flight is assumed to begin before ``since``
     [time].  ``quick`` has the same meaning as in the examination of one td.
@@ -368,7 +368,7 @@ def make_look(
 
 
 def _limit_start(situation: Situation, since: float) -> Situation:
-    """Return the situation with a flight that does not begin before ``since`` [time]."""
+    """Return the situation with a flight that begins at or after ``since`` [time]."""
     flight = situation.flight
     if flight.start is None or flight.start >= since:
         return situation
@@ -382,7 +382,7 @@ def _find_flight_at(
     evidence: Seen,
     described: Described | None,
 ) -> Flight:
-    """Return the flight around td, from the evidence or as the user gives it; supported parts never fly."""
+    """Return the flight around td, from the evidence or given by the user; supported parts never fly."""
     flight = find_flight(history, td, evidence, described)
     if evidence.held:
         return flight
@@ -394,7 +394,7 @@ def _find_flight_at(
 
 
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Limit a flight to the time in which no support acts on the parts.
+    """Limit a flight to the time in which no support holds the parts.
 
     A flight found by the momenta of the parts is limited already.
     """
@@ -458,7 +458,7 @@ def _find_oscillator(
 def _find_window_of_modes(
     history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
 ) -> Described | None:
-    """Return a window that modes describe, if only the energy can show a flight; else None."""
+    """Return a window described by modes if only the energy can show a flight, otherwise None."""
     if evidence.flight or evidence.refusal or not settings.replay:
         return None
     # imported here: most records do not need it
@@ -481,7 +481,7 @@ def _find_window_of_modes(
 def _add_hidden_share(
     history: History, fit: Identification, fits: Fits
 ) -> Identification:
-    """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
+    """Add to an accepted fit the energy share of a further mode that its misfit may hide."""
     if not fit.describes_record or fit.mode is None:
         return fit
     window = history.between(fit.start, fit.end)

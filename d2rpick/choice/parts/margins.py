@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.vibration.span import Fits
 
-# Number of times in a flight at which a body is tried as frozen: motion within it is slow.
+# Number of times in a flight at which a body is tried as frozen: its inner motion is slow.
 _TIMES: Final = 100
 
 
@@ -25,7 +25,7 @@ def find_drift_of_bodies(
     """Return the drift of the rigid bodies of the parts in a flight, computed once; None without data of parts."""
     if flight.parts is None:
         return None
-    # imported here: a table has no parts
+    # imported here: tables have no parts
     from d2rpick.flight.position_error import (
         find_bodies_in_flight,
     )
