@@ -1,4 +1,4 @@
-"""The pages of the reference that follow from the code: commands, rules of ``check``, and keys of JSON.
+"""The pages of the reference that follow from the code: commands, rules of ``check``, warnings, and keys of JSON.
 
 ``python -m tests.reference`` writes them to docs/reference; a test holds them current.
 """
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from d2rpick.cli import COMMANDS, d2rpick
+from d2rpick.report.warning_texts import EXPLANATIONS_BY_TOPIC
 from d2rpick.rules import RULES
 from tests.command import ROOT
 
@@ -23,16 +24,27 @@ SCHEMAS: Final = ROOT / "d2rpick" / "schemas"
 
 
 _RULES_INTRODUCTION: Final = (
-    "What each rule of `d2rpick check` finds, and why it matters. `d2rpick rule D2R105` prints the same, with decks "
-    "that pass and fail. [Check decks](../how-to/check-decks.md) explains how to select, ignore and grade rules."
+    "This page explains what each rule of `d2rpick check` finds, and how to fix the problem. `d2rpick rule D2R105` "
+    "prints the same text, with example decks that pass and fail. [Check decks](../how-to/check-decks.md) explains how "
+    "to select and silence rules, and how to change their severity."
 )
+_WARNINGS_INTRODUCTION: Final = (
+    "This page explains each warning: what happened, what it means for the result, and what to do. "
+    "`d2rpick rule margin-kept` prints the same text. Each warning has a stable code. JSON lists the warnings of an "
+    "answer under `warnings`."
+)
+# What a topic of the warnings says before its first warning.
+_WARNINGS_TOPIC_INTRODUCTIONS: Final = {
+    "Health of the run": "[Checks](checks.md#health-of-the-reference-run) lists the limits and their sources."
+}
 _JSON_INTRODUCTION: Final = (
-    "What `-f json` and `-f ndjson` print. The schemas are in the folder `d2rpick/schemas` of the package. Keys are "
-    "only added; `null` means unknown. A name with dots is a key within a key, and `[]` stands for each item of a list."
+    "This page lists the keys that `-f json` and `-f ndjson` print. The folder `d2rpick/schemas` of the package "
+    "contains the schemas. Within one schema number, keys are only added. `null` means unknown. A name with dots is a "
+    "key within a key, and `[]` stands for each item of a list."
 )
 _COMMANDS_INTRODUCTION: Final = (
-    "Every command with all its options, as `d2rpick COMMAND --help` prints them. HISTORY is a file, a folder or a "
-    "quoted pattern with the files of one run ([histories](histories.md)); DECK is a main deck."
+    "This page lists every command with all its options, as `d2rpick COMMAND --help` prints them. HISTORY is a file, a "
+    "folder or a quoted pattern for the files of one run ([histories](histories.md)). DECK is a main deck."
 )
 
 _SOLVERS: Final = {"ls-dyna": "LS-DYNA", "radioss": "Radioss"}
@@ -130,6 +142,26 @@ def rules_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def warnings_page() -> str:
+    """Write the page of the warnings; the anchor of a warning is its code."""
+    lines = ["# Warnings", "", _WARNINGS_INTRODUCTION]
+    for topic, explanations in EXPLANATIONS_BY_TOPIC.items():
+        lines += ["", f"## {topic}"]
+        if topic in _WARNINGS_TOPIC_INTRODUCTIONS:
+            lines += ["", _WARNINGS_TOPIC_INTRODUCTIONS[topic]]
+        for code, (means, fix) in explanations.items():
+            lines += ["", f"### {code}", "", link_rules(means)]
+            lines += ["", f"**Fix.** {link_rules(fix)}"]
+    return "\n".join(lines) + "\n"
+
+
+def link_rules(text: str) -> str:
+    """Return the text with a link at each id of a rule of check."""
+    return re.sub(
+        r"D2R\d{3}", lambda match: f"[{match[0]}](rules.md#{match[0].lower()})", text
+    )
+
+
 def json_page() -> str:
     """Write the page of the keys in JSON, from the schemas that ship."""
     lines = ["# Keys of JSON", "", _JSON_INTRODUCTION]
@@ -189,7 +221,12 @@ def _kind(schema: Mapping[str, Any]) -> str:
     return kinds if isinstance(kinds, str) else " or ".join(kinds)
 
 
-PAGES: Final = {"commands": commands_page, "rules": rules_page, "json": json_page}
+PAGES: Final = {
+    "commands": commands_page,
+    "rules": rules_page,
+    "warnings": warnings_page,
+    "json": json_page,
+}
 
 
 def write_pages() -> None:

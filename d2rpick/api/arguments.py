@@ -8,15 +8,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping, Set
-from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
-from d2rpick.api.request import OPTIONS, TIME, Number
+from d2rpick.api.request import OPTIONS, Request
 from d2rpick.base.errors import DeckError
-from d2rpick.choice.pair.grades import GRADES
+from d2rpick.base.options import TIME, Number, Option
 
 if TYPE_CHECKING:
     from typing import Literal
 
+    from d2rpick.api.choosing import Choosing
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
@@ -26,40 +27,6 @@ if TYPE_CHECKING:
     Parts = str | int | Iterable[str | int]
 
 _LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut off in a message
-
-
-class Choosing(TypedDict, total=False):
-    """How to choose and judge, like the options of ``d2rpick suggest``; times in the unit of the history.
-
-    None stands for the default.
-
-    ``after``: end of the load, ``landing``: the next contact (default: determined from the record).  ``margin``: time
-    kept free after the load and before the next contact (default 0; if td is chosen or the landing is given, it is
-    derived).  ``tolerance``: largest lock-in error, or level error if no oscillator is known (0.2).
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: used instead of
-    the identified one, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the only
-    window in which the oscillator is identified.  ``replay`` False: judge by the energy level alone.  ``strict``:
-    accept no tr if only the energy shows the end of the load.  ``keep_vibration``: grade the vibration by itself, even
-    if its error hardly matters in the next contact.  ``min_quality``: "poor", "fair" or "good", the lowest grade of a
-    pair that `plan` plans and `check` passes ("fair").  ``cost_share``: share of the switched parts in the cost of a
-    step.  ``step_ratio``: time step while rigid over that while deformable, 1 or more.
-    """
-
-    after: float | None
-    landing: float | None
-    margin: float | None
-    tolerance: float | None
-    max_kinetic_share: float | None
-    max_residual: float | None
-    oscillator: Oscillator | None
-    v0: float | None
-    fit_window: tuple[float, float] | None
-    replay: bool | None
-    strict: bool | None
-    keep_vibration: bool | None
-    min_quality: str | None
-    cost_share: float | None
-    step_ratio: float
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -201,12 +168,7 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
     """
     if value is None:
         return None
-    is_pair = (
-        hasattr(value, "__len__")
-        and hasattr(value, "__iter__")
-        and getattr(value, "ndim", 1) == 1
-    )
-    if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
+    if not _is_pair(value):
         raise TypeError(
             f"{name} is {_format_wrong_value(value)}, a pair of times was expected"
         )
@@ -217,6 +179,17 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
             f"{name} is {times[0]:g} to {times[1]:g}, which is empty; the lower time comes first"
         )
     return times
+
+
+def _is_pair(value: Any) -> bool:
+    """Return True for an ordered collection of two values, also of numpy."""
+    is_ordered = (
+        hasattr(value, "__len__")
+        and hasattr(value, "__iter__")
+        and getattr(value, "ndim", 1) == 1
+        and not isinstance(value, str | bytes | Mapping | Set)
+    )
+    return is_ordered and len(value) == 2
 
 
 def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
@@ -344,59 +317,73 @@ def refuse_unknown(
     raise TypeError(f"there is no argument {name!r}; {meant}")
 
 
+def check_option(name: str, value: object, option: Option, default: Any = None) -> Any:
+    """Return a value converted to the kind of its option; the default for None.
+
+    Examples
+    --------
+    >>> check_option("min_quality", "best", OPTIONS["min_quality"])
+    Traceback (most recent call last):
+    ValueError: min_quality is 'best', one of poor, fair, good was expected
+    """
+    kind: Any = option.kind
+    if value is None:
+        return default
+    if kind == "flag":
+        return check_flag(name, value, default)
+    if option.many:
+        return list_part_names(name, value)  # type: ignore[arg-type]
+    if option.pair and isinstance(kind, range):
+        return check_two_whole_numbers(name, value, kind.start)
+    if option.pair:
+        return check_time_window(name, value)
+    if isinstance(kind, range):
+        return check_whole_number(name, value, kind.start)
+    if isinstance(kind, Number):
+        return check_number(name, value, kind)
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is {_format_wrong_value(value)}, a text was expected")
+    if isinstance(kind, tuple) and value not in kind:
+        raise ValueError(
+            f"{name} is {_format_wrong_value(value)}, one of {', '.join(kind)} was expected"
+        )
+    return value
+
+
 def read_choosing(choosing: Choosing) -> dict[str, Any]:
     """Return the fields of a request that contain how to choose."""
-    annotations = Choosing.__annotations__
-    if unknown := [name for name in choosing if name not in annotations]:
-        refuse_unknown(
-            unknown[0], annotations, ("parts", "flying", "deck", "weights", "td_window")
-        )
+    from d2rpick.api.choosing import Choosing as Arguments
+
+    expected_names = Arguments.__annotations__
     arguments: dict[str, Any] = dict(choosing)
+    if unknown := [name for name in arguments if name not in expected_names]:
+        other_names = ("parts", "flying", "deck", "weights", "td_window")
+        refuse_unknown(unknown[0], expected_names, other_names)
     oscillator = _check_oscillator(arguments.pop("oscillator", None))
     if (oscillator is None) != (arguments.get("v0") is None):
         raise ValueError(
             "oscillator and v0 go together: the one vibrates because of the other"
         )
-    if arguments.get("tolerance", 0.0) is None:
-        del arguments["tolerance"]
-    check_grade(arguments.get("min_quality"))
-    of_other_kinds = {"replay", "strict", "keep_vibration", "fit_window", "min_quality"}
-    for name in arguments.keys() - of_other_kinds:
-        limits: Any = OPTIONS[name].kind
-        if arguments[name] is not None:
-            arguments[name] = check_number(name, arguments[name], limits)
-    arguments["fit_window"] = check_time_window(
-        "fit_window", arguments.get("fit_window")
-    )
-    arguments["no_verify"] = not check_flag(
-        "replay", arguments.pop("replay", None), True
-    )
-    arguments["strict"] = check_flag("strict", arguments.get("strict"), False)
-    arguments["keep_vibration"] = check_flag(
-        "keep_vibration", arguments.get("keep_vibration"), False
-    )
-    of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
-    return arguments | {
-        name: float(getattr(oscillator, name))
-        for name in of_oscillator
-        if oscillator is not None
+    replay = check_flag("replay", arguments.pop("replay", None), True)
+    checked = {
+        name: check_option(name, value, OPTIONS[name], getattr(Request, name))
+        for name, value in arguments.items()
     }
+    checked["no_verify"] = not replay
+    if oscillator is not None:
+        for name in ("stiffness", "mass", "frame_mass", "alpha"):
+            checked[name] = float(getattr(oscillator, name))
+    return checked
 
 
-def check_grade(value: object) -> None:
-    """Raise ValueError unless the value is a grade of a pair.
-
-    Examples
-    --------
-    >>> check_grade("best")
-    Traceback (most recent call last):
-    ValueError: min_quality is 'best', one of poor, fair, good was expected
-    """
-    if value is None or value in GRADES:
-        return
-    raise ValueError(
-        f"min_quality is {_format_wrong_value(value)}, one of {', '.join(GRADES)} was expected"
-    )
+def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, int]:
+    """Return two whole numbers of at least ``low``."""
+    if not _is_pair(value):
+        raise TypeError(
+            f"{name} is {_format_wrong_value(value)}, a pair of numbers was expected"
+        )
+    first, second = list(value)  # type: ignore[call-overload]
+    return check_whole_number(name, first, low), check_whole_number(name, second, low)
 
 
 def _check_oscillator(value: object) -> Oscillator | None:

@@ -25,7 +25,8 @@ from d2rpick.histories.names import Selection, has_recommended
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.arguments import Parts
+    from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.parts.cost import CostModel, Weights
     from d2rpick.choice.question import Settings

@@ -7,26 +7,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
-from d2rpick.api.request import (
-    OPTIONS,
+from d2rpick.api.request import OPTIONS, Request
+from d2rpick.base.errors import ArgumentError, Caution
+from d2rpick.base.options import (
     POSITIVE,
     TIME,
     UNLIMITED,
-    Number,
     Option,
-    Request,
     list_options,
     make_option,
     make_option_name,
 )
-from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.options import CHOOSING_FOR_CARDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.arguments import Parts
     from d2rpick.api.asked import RunQuestion
+    from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.switched.switched_run import Times
@@ -61,44 +61,19 @@ class CardOptions(TypedDict, total=False):
     wall: int | None
 
 
-class Judging(CardOptions, total=False):
-    """Options of a card, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
+if TYPE_CHECKING:
 
-    after: float | None
-    landing: float | None
-    margin: float | None
-    tolerance: float | None
+    class Judging(CardOptions, JudgingOptions, total=False):
+        """Options of a card, and how the windows are judged."""
 
 
 def _check_option(name: str, value: Any, option: Option) -> Any:
-    """Return a value converted to the kind of its option."""
+    """Return a value converted to the kind of its option; the solvers are known only where a card is printed."""
     from d2rpick.api import arguments
 
-    kind = option.kind
-    if option.many:
-        return arguments.list_part_names(name, value)
-    if option.pair:
-        is_pair = (
-            hasattr(value, "__len__")
-            and hasattr(value, "__iter__")
-            and getattr(value, "ndim", 1) == 1
-        )
-        if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
-            raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
-        return tuple(
-            arguments.check_whole_number(name, number, _IDS.start) for number in value
-        )
-    if isinstance(kind, range):
-        return arguments.check_whole_number(name, value, kind.start)
-    if isinstance(kind, Number):
-        return arguments.check_number(name, value, kind)
-    if not isinstance(value, str):
-        raise TypeError(f"{name} is {value!r}, a text was expected")
-    if kind == "solver" and value not in list_solvers():
-        raise ValueError(
-            f"{name} is {value!r}, one of {', '.join(list_solvers())} was expected"
-        )
-    return value
+    if option.kind == "solver":
+        option = option._replace(kind=tuple(list_solvers()))
+    return arguments.check_option(name, value, option)
 
 
 def list_solvers() -> Sequence[str]:
@@ -407,8 +382,8 @@ def card(
     parts : number or several, optional
         The parts to be switched; with a run that has parts by title too.
     **options
-        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run ``after``, ``landing``,
-        ``margin``, ``tolerance``.
+        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run also how it is
+        judged, see ``d2rpick.api.choosing.JudgingOptions``.
 
     Returns
     -------
@@ -434,7 +409,7 @@ def card(
     arguments_of_card: dict[str, Any] = dict(options)
     judging: Any = {
         name: arguments_of_card.pop(name)
-        for name in ("after", "landing", "margin", "tolerance")
+        for name in CHOOSING_FOR_CARDS
         if name in arguments_of_card
     }
     return print_card(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Choosing
+    from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.rules import CheckedWindow

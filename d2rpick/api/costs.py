@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.arguments import Parts
+    from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.choice.switched.switched_run import Times

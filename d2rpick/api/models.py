@@ -5,17 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.api.request import (
+from d2rpick.api.request import OPTIONS, Request
+from d2rpick.base.errors import ArgumentError, Caution
+from d2rpick.base.options import (
     NOT_NEGATIVE,
-    OPTIONS,
     POSITIVE,
     TIME,
     UNLIMITED,
-    Request,
     make_option,
     make_option_name,
 )
-from d2rpick.base.errors import ArgumentError, Caution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

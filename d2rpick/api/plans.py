@@ -9,8 +9,9 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, print_judged_card
-from d2rpick.api.request import NOT_NEGATIVE, check_window
+from d2rpick.api.request import check_window
 from d2rpick.base.errors import ArgumentError, DeckError
+from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.choice.td import plan as planning, trade_off
 
 if TYPE_CHECKING:
@@ -18,8 +19,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.arguments import Parts
     from d2rpick.api.checking import Findings
+    from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times

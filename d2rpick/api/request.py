@@ -6,14 +6,22 @@ arguments of Python, and the command line that repeats an answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from functools import cache
-from math import inf
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.pair.grades import GRADES
+from d2rpick.base.options import (
+    NOT_NEGATIVE,
+    POSITIVE,
+    TIME,
+    Number,
+    Option,
+    list_options,
+    make_option,
+    make_option_name,
+)
+from d2rpick.choice import options
+from d2rpick.choice.options import ChoiceOptions
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
@@ -25,119 +33,29 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = 0.7  # relative to the reference run; in well switched computed runs it was 0.77 or more
-UNLIMITED: Final = 2**63  # end of a range of whole numbers without upper limit
-# Groups of options: how to read a history, how to judge by it, and how to judge a tr.
+# Options that say how a history is read, and of these all but the parts, which a deck says itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
-JUDGING: Final = (
-    "input_format",
-    "time",
-    "energy",
-    "flying",
-    "channel",
-    "after",
-    "landing",
-    "margin",
-    "tolerance",
-    "min_quality",
-)
+_READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
-LIMITS: Final = (
-    *(
-        "after",
-        "landing",
-        "margin",
-        "tolerance",
-        "max_kinetic_share",
-        "max_residual",
-        *OSCILLATOR,
-    ),
-    *("fit_window", "no_verify", "strict", "keep_vibration"),
-)
-CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
+_MODEL: Final = (*OSCILLATOR, "no_verify")
+# Options that say how a pair is chosen, how those of sets of parts and of many runs are, and how cards are judged.
+CHOOSING: Final = (*options.CHOOSING, *_MODEL)
+CHOOSING_FOR_SETS: Final = (*options.CHOOSING_FOR_SETS, *_MODEL)
+ADVANCED: Final = (*_MODEL, *options.ADVANCED)
+JUDGING: Final = (*_READING_FOR_CARDS, *options.CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights that are no file: typed as it is, the command line is refused, so that it never uses other
 # weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
-class Number(NamedTuple):
-    """A finite number from ``low`` (or above it, if ``above``) to ``high``."""
-
-    low: float = -inf
-    high: float = inf
-    above: bool = False
-
-    def missed(self, value: float) -> str:
-        """Return the limit that a value violates as text, empty if the value is allowed."""
-        if value < self.low or (self.above and value == self.low):
-            return f"{'above' if self.above else 'of at least'} {self.low:g}"
-        return f"of at most {self.high:g}" if value > self.high else ""
-
-
-TIME, POSITIVE, NOT_NEGATIVE, FRACTION = (
-    Number(),
-    Number(0.0, above=True),
-    Number(0.0),
-    Number(0.0, 1.0),
-)
-AT_LEAST_ONE: Final = Number(
-    1.0
-)  # elements that are rigid no longer limit the time step, which cannot become smaller
-
-
-class Option(NamedTuple):
-    """An option: the ``kind`` of its value, its help text, and the options that it replaces.
-
-    ``kind`` is a `Number`, a range of whole numbers, a list of names, or a kind of the command line: "flag", "file",
-    "names", ...  ``many``: it can be repeated; ``pair``: two values.
-    """
-
-    help: str
-    kind: Number | range | tuple[str, ...] | str = "text"
-    metavar: str | None = None
-    many: bool = False
-    pair: bool = False
-    instead_of: tuple[str, ...] = ()
-    short: tuple[str, ...] = ()
-
-
-def make_option(
-    text: str,
-    kind: Any = "text",
-    metavar: str | None = None,
-    *,
-    default: Any = None,
-    **keywords: Any,
-) -> Any:
-    """Return a field of a table of options; one that can be repeated is an empty tuple by default."""
-    default = () if keywords.get("many") else default
-    return field(
-        default=default, metadata={"option": Option(text, kind, metavar, **keywords)}
-    )
-
-
 def _make_oscillator_option(text: str, kind: Number = POSITIVE, *others: str) -> Any:
     return make_option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
 
 
-@cache
-def list_options(table: Any) -> dict[str, Option]:
-    """Return the options of a table by the names of their fields."""
-    return {
-        field.name: field.metadata["option"]
-        for field in fields(table)
-        if "option" in field.metadata
-    }
-
-
-# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
-# start.
-@dataclass(eq=False, repr=False, kw_only=True)
-class Request:
-    """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
-
-    ``given`` names the options that were given, also those given with their default value.
-    """
+@dataclass(init=False, eq=False, repr=False, kw_only=True)
+class ReadingOptions:
+    """Which run is meant, and how its files are read."""
 
     deck: str | None = make_option(
         "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
@@ -167,7 +85,7 @@ class Request:
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
     )  # fmt: skip
     part: tuple[str, ...] = make_option(
-        "Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
+        'Parts to switch: number (3,7), range (10-19), title, "flying" or "all"; energies are added.',
         *("parts", "IDS"), many=True, instead_of=("energy",),
     )  # fmt: skip
     flying: tuple[str, ...] = make_option(
@@ -177,31 +95,17 @@ class Request:
         "Channel of another quantity, if its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
-    after: float | None = make_option(
-        "End of the load.  [default: found from the record]", TIME, "T"
-    )
-    landing: float | None = make_option(
-        "Time of the next contact after the flight; td is earlier by the margin.  [default: found from the record]",
-        TIME,
-        "T",
-    )
-    margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: 0; derived if d2rpick chooses "
-        "td, or with --landing]",
-        *(NOT_NEGATIVE, "T"),
-    )
-    tolerance: float = make_option(
-        "Largest lock-in error, or level error if no oscillator describes the record.",
-        FRACTION,
-        "L",
-        default=0.2,
-    )
-    max_kinetic_share: float | None = make_option(
-        "Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K"
-    )
-    max_residual: float | None = make_option(
-        "Reject a pair with a larger residual.", NOT_NEGATIVE, "R"
-    )
+
+
+# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
+# start.
+@dataclass(eq=False, repr=False, kw_only=True)
+class Request(ChoiceOptions, ReadingOptions):
+    """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
+
+    ``given`` names the options that were given, also those given with their default value.
+    """
+
     stiffness: float | None = _make_oscillator_option("Spring k.")
     mass: float | None = _make_oscillator_option("Suspended mass M.")
     frame_mass: float | None = _make_oscillator_option(
@@ -216,40 +120,10 @@ class Request:
     v0: float | None = _make_oscillator_option(
         "Velocity of the frame at time 0; the rest is at rest.", TIME, "vz0"
     )
-    fit_window: tuple[float, float] | None = make_option(
-        "Window of time in which the oscillator is identified.",
-        TIME,
-        "LO HI",
-        pair=True,
-        instead_of=("stiffness", "no_verify"),
-    )
     no_verify: bool = make_option(
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    strict: bool = make_option(
-        "Recommend nothing if only the energy shows when the load ends.",
-        "flag",
-        default=False,
-    )
-    keep_vibration: bool = make_option(
-        "Grade the vibration by its own error, also if that is small in the next contact.",
-        "flag",
-        default=False,
-    )
-    min_quality: str | None = make_option(
-        "Lowest grade that is not reported as a problem (exit code 1).  [default: fair; poor if only --td is given]",
-        GRADES,
-    )
-    cost_share: float | None = make_option(
-        "Share of the cost of a time step that the elements of the switched parts take, to predict the run time.",
-        *(FRACTION, "C"),
-    )
-    step_ratio: float | None = make_option(
-        "Ratio of the time step while rigid to the one before, 1 or more.  [default: 1]",
-        AT_LEAST_ONE,
-        "N",
-    )
     run_folder: str | None = None  # folder of a run whose files are named in `history`
     deck_in_folder: bool = False  # True if `deck` was found in the folder of the run
     given: Collection[str] | None = None
@@ -345,20 +219,13 @@ class Request:
             )  # imported here since it is rarely given
 
             mode = to_mode(oscillator, self.v0)
-        same = {
-            field.name: getattr(self, field.name)
-            for field in fields(Settings)
-            if field.name in OPTIONS
+        # the settings have their own defaults for what the question leaves open
+        chosen = {
+            name: getattr(self, name)
+            for name in options.CHOOSING
+            if getattr(self, name) is not None
         }
-        return Settings(
-            **{
-                **same,
-                "step_ratio": self.step_ratio or 1.0,
-                "min_quality": self.min_quality or Settings.min_quality,
-            },
-            oscillator=mode,
-            replay=not self.no_verify,
-        )
+        return Settings(**chosen, oscillator=mode, replay=not self.no_verify)
 
     def selection(self, *, parts: bool = True) -> Selection:
         """Return the selected columns and, with ``parts``, parts; raise ArgumentError if energies are given twice."""
@@ -462,11 +329,6 @@ def choose_time_or_window(
         raise ArgumentError("`td` and `td_window` exclude each other")
     check_window("td_window", window)
     return window if td is None else td
-
-
-def make_option_name(name: str) -> str:
-    """Return the name of an option as it is typed."""
-    return name.replace("_", "-")
 
 
 OPTIONS: Final[Mapping[str, Option]] = list_options(Request)

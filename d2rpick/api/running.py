@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
 from d2rpick.api.cards import parse_numbers
-from d2rpick.api.request import NOT_NEGATIVE
+from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:

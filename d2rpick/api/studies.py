@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.arguments import Parts
+    from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
 _LAST: Final = b'{"schema": '  # beginning of the summary after the rows

@@ -15,8 +15,9 @@ from d2rpick.api.cards import (
     JudgedCard,
     print_judged_card as card_judged,
 )
-from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, choose_time_or_window
+from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.base.errors import ArgumentError
+from d2rpick.base.options import FRACTION
 from d2rpick.choice import answers
 from d2rpick.histories.digits import round_as_read
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.arguments import Parts
+    from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.pair.candidates import Pair
     from d2rpick.choice.parts.cost import Weights
@@ -194,9 +196,7 @@ def suggest(
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
-        How to choose: ``after``, ``landing``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
-        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``keep_vibration``, ``cost_share``,
-        ``step_ratio``; what they mean stands in ``d2rpick.api.arguments.Choosing``.
+        How to choose, for example ``tolerance`` or ``max_residual``: see ``d2rpick.api.choosing.Choosing``.
 
     Returns
     -------

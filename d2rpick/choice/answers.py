@@ -176,7 +176,6 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     RangeError
         If tr lies outside the record or is not before td.
     """
-    settings = situation.settings
     td = situation.td
     _check_order(tr, td)
     situation.history.energy_at(tr, "tr")
@@ -184,15 +183,13 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
     candidate = judged[0]
     is_known = situation.flight.start is not None
     share = situation.kinetic_share
-    if settings.max_kinetic_share is None:
-        limit = POOR_KINETIC_SHARE
-    else:
-        limit = settings.max_kinetic_share
+    exceeded = list_exceeded_limits(situation, candidate)
     outside = td > situation.latest_td or (
         situation.earliest_tr is not None and td <= situation.earliest_tr
     )
-    td_ok = None if share is None else share <= limit
-    if outside:
+    limits_td = situation.settings.max_kinetic_share is not None
+    td_ok = None if share is None else limits_td or share <= POOR_KINETIC_SHARE
+    if outside or any(excess.is_td_wrong for excess in exceeded):
         td_ok = False
     return PairVerdict(
         situation=situation,
@@ -200,7 +197,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
         tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
         admissible=bool(judged.kept[0]),
-        reasons=(*candidate.notes, *list_exceeded_limits(situation, candidate)),
+        reasons=(*candidate.notes, *(excess.message for excess in exceeded)),
         cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
 
@@ -311,7 +308,8 @@ class PairSuggestion(AnswerAtTd):
         """Decide on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
         limits = list_exceeded_limits(self.situation, candidate)
-        return decide(self.situation, candidate, objections=(*objections, *limits))
+        messages = (excess.message for excess in limits)
+        return decide(self.situation, candidate, objections=(*objections, *messages))
 
     @property
     def quality(self) -> Quality | None:
@@ -471,7 +469,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     if situation.td > situation.latest_td:
         return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
     nearest = ranked[0]
-    reasons = "; ".join((*nearest.notes, *list_exceeded_limits(situation, nearest)))
+    exceeded = list_exceeded_limits(situation, nearest)
+    reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.options import ChoiceOptions
 from d2rpick.choice.pair.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
@@ -59,40 +60,23 @@ def read_reference(
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Settings:
-    """Settings of the analyst; times in the unit of the history.
+# Not frozen, like the table of options that it extends, although it is never changed.
+@dataclass(eq=False, repr=False, kw_only=True)
+class Settings(ChoiceOptions):
+    """Settings of the analyst: the options of a choice, and what the deck of the run says about it.
 
-    ``after``: end of the load, ``landing``: next contact (None: found from the record).  ``margin``: time kept clear
-    after the load and before the next contact (None: 0, but if td is chosen or the landing given, what
-    `d2rpick.flight.margin` derives before the contact).  ``tolerance``: limit of the lock-in error, or of the level
-    error without an oscillator [-].  ``max_kinetic_share``, ``max_residual``: further limits of a recommendation, or
-    None [-].  ``oscillator``: given instead of identified.  ``fit_window``: window in which the oscillator is
-    identified.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr of a flight that is not
-    certain.  ``keep_vibration``: grade the vibration itself, even if its error is small relative to the next contact.
-    ``min_quality``: lowest grade of a pair that is planned, and that a deck passes with.
-    ``cost_share``: share of the switched parts in the cost of a step; without it the run time stays unknown.
-    ``step_ratio``: time step while rigid over that while deformable.  ``bodies``: rigid bodies that the parts become,
-    according to a deck; None without a deck, empty if it does not define them; then one body is assumed.
+    ``oscillator``: given instead of identified.  ``replay`` False: judge by the energy level alone.  ``min_quality``:
+    lowest grade of a pair that is planned, and that a deck passes with.  ``bodies``: rigid bodies that the parts
+    become, according to a deck; None without a deck, empty if it does not define them; then one body is assumed.
     ``placement``: places of the parts according to the deck, or None.  ``by_deck``: sources of these and of a cost
     share that is not given; None without a deck.  ``kept_off``: main nodes of rigid bodies that a Radioss deck keeps
     inactive.  ``ruined``: faults of the deck that ruin its run.
     """
 
-    after: float | None = None
-    landing: float | None = None
-    margin: float | None = None
-    tolerance: float = 0.2
-    max_kinetic_share: float | None = None
-    max_residual: float | None = None
-    oscillator: Mode | None = None
-    fit_window: tuple[float, float] | None = None
-    replay: bool = True
-    strict: bool = False
-    keep_vibration: bool = False
     min_quality: str = FAIR
-    cost_share: float | None = None
     step_ratio: float = 1.0
+    oscillator: Mode | None = None
+    replay: bool = True
     bodies: tuple[RigidBody, ...] | None = None
     placement: Placement | None = field(default=None, compare=False, repr=False)
     by_deck: ByDeck | None = field(default=None, compare=False, repr=False)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, warn_if_unbalanced
-from d2rpick.api.request import list_options
 from d2rpick.base.errors import ArgumentError, D2RPickError
+from d2rpick.base.options import list_options
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
 from d2rpick.cli.progress import show_counting

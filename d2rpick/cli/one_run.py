@@ -10,17 +10,15 @@ import click
 from d2rpick.api.cards import Cards, JudgedCard, collect_cautions
 from d2rpick.api.request import (
     CHOOSING,
-    FRACTION,
-    LIMITS,
+    CHOOSING_FOR_SETS,
     MIN_MEAN_ENERGY,
-    NOT_NEGATIVE,
     READING,
-    Option,
     Request,
     check_window,
     choose_time_or_window,
 )
 from d2rpick.base.errors import ArgumentError, DeckError, make_printable
+from d2rpick.base.options import FRACTION, NOT_NEGATIVE, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import (
     ANSWER,
@@ -328,7 +326,7 @@ def verify(
         "weights",
         HISTORY,
         *READING,
-        *LIMITS,
+        *CHOOSING_FOR_SETS,
         "step_ratio",
         "report",
         *RESULT,

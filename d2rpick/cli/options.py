@@ -10,18 +10,9 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
-from d2rpick.api.request import (
-    CHOOSING,
-    JUDGING,
-    OSCILLATOR,
-    READING,
-    TIME,
-    Option,
-    Request,
-    list_options,
-    make_option_name,
-)
+from d2rpick.api.request import ADVANCED, CHOOSING, JUDGING, READING, Request
 from d2rpick.base.errors import ArgumentError
+from d2rpick.base.options import TIME, Option, list_options, make_option_name
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
 from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
@@ -58,42 +49,18 @@ DECK_OF_PARTS: Final = (
 # Sections of the help, after the options of a command that belong to no section.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
-        *(
-            "tr",
-            "td",
-            "td_window",
-            "steps",
-            "min_rigid",
-            "after",
-            "landing",
-            "margin",
-            "wait",
-        ),
-        *(
-            "tolerance",
-            "max_kinetic_share",
-            "max_residual",
-            "min_mean_energy",
-            "strict",
-            "keep_vibration",
-            "min_quality",
-        ),
+        *("tr", "td", "td_window", "steps", "min_rigid"),
+        *(name for name in CHOOSING if name not in ADVANCED),
+        *("wait", "min_mean_energy"),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
     "Deck and cost": ("deck", "no_deck", "weights", "write_deck"),
     "Cards": CARDS,
     "Output": (
-        "all",
-        "limit",
-        "plot",
-        "report",
-        *RESULT,
-        "verbose",
-        "show_settings",
-        "debug",
-        "help",
+        *("all", "limit", "plot", "report", *RESULT),
+        *("verbose", "show_settings", "debug", "help"),
     ),
-    "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
+    "Advanced": ADVANCED,
 }
 # Placeholders of options that are times of the run.
 _TIMES: Final = ("T", "LO HI")
@@ -312,7 +279,10 @@ def make_click_option(
     name: str, entry: Option, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
     """Make click's option from an entry of a table."""
-    about: dict[str, Any] = {"help": entry.help, "metavar": entry.metavar}
+    about: dict[str, Any] = {
+        "help": replace_arguments(entry.help),
+        "metavar": entry.metavar,
+    }
     if entry.kind == "flag":
         about["is_flag"] = True
     else:

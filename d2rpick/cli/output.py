@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 import click
 
 from d2rpick.api.cards import Cards, JudgedCard
-from d2rpick.api.request import (
-    OPTIONS,
-    UNLIMITED,
-    Request,
-    list_options,
-    make_option,
-    make_option_name,
-)
+from d2rpick.api.request import OPTIONS, Request
 from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,
@@ -29,6 +22,7 @@ from d2rpick.base.errors import (
     make_printable,
 )
 from d2rpick.base.files import write_as_a_whole
+from d2rpick.base.options import UNLIMITED, list_options, make_option, make_option_name
 from d2rpick.cli.progress import is_on_terminal, show_reading
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option, Request
 from d2rpick.base.errors import make_printable
+from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
 from d2rpick.cli import options
 from d2rpick.cli.output import Output, encode_text, replace_arguments_for_people, tell
 from d2rpick.cli.progress import show_progress
@@ -17,6 +17,7 @@ from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
+    from d2rpick.api.request import Request
 
 
 CMD = ("program", "CMD")

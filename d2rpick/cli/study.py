@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from d2rpick.api.request import (
-    LIMITS,
+    CHOOSING_FOR_SETS,
     READING,
-    UNLIMITED,
-    Option,
     Request,
     choose_time_or_window,
 )
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
+from d2rpick.base.options import UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
 from d2rpick.cli.output import Output, tell
@@ -58,7 +57,7 @@ if TYPE_CHECKING:
     "Use a running Dask cluster, which must see the same files.", "program", "ADDRESS", instead_of=("jobs",)
 ))  # fmt: skip
 @options.add_options(
-    *(*READING, *LIMITS, "plot", "report", *RESULT),
+    *(*READING, *CHOOSING_FOR_SETS, "plot", "report", *RESULT),
     plot="Draw the energies of all runs to FILE (png, svg, pdf).",
     report="Write everything to one HTML page to read, print and sign.",
     forms=FORMATS["study"],

@@ -11,8 +11,9 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import SETTINGS, Cards, list_solvers
-from d2rpick.api.request import JUDGING, UNLIMITED, Number, list_options, write_option
+from d2rpick.api.request import JUDGING, write_option
 from d2rpick.base.errors import ConfigurationError
+from d2rpick.base.options import UNLIMITED, Number, list_options
 from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown
 from d2rpick.cli import COMMANDS
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.contact_forces import ContactForce
+    from d2rpick.histories.resuming import ResumePoint
 
     Indices = NDArray[np.intp]
 
@@ -101,6 +102,10 @@ class Database:
         """Forces of contacts and rigid walls; raises FormatError if they are written but cannot be read."""
         return ()
 
+    def find_resume_points(self) -> Mapping[str, ResumePoint]:
+        """Return for each file where a later read can begin; empty if the format is always read as a whole."""
+        return {}
+
     def branch(self, name: str) -> Database:
         """Return the branch of the whole model (``glstat``) or the parts (``matsum``); FormatError if it is missing."""
         reason = self.no_channels if name == "glstat" else self.no_parts
@@ -171,6 +176,13 @@ class Legs:
         self.named_by_people = first.named_by_people
         self.title, self.time_unit = first.title, first.time_unit
         self.complete = all(leg.complete for leg in self._files) and not cut
+
+    def find_resume_points(self) -> Mapping[str, ResumePoint]:
+        """Return for each file of all legs where a later read can begin; empty if they are read as a whole."""
+        points: dict[str, ResumePoint] = {}
+        for leg in self._files:
+            points |= leg.find_resume_points()
+        return points
 
     @property
     def energy_channel(self) -> str | None:

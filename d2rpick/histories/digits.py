@@ -126,16 +126,24 @@ def format_distinctly(numbers: Sequence[float]) -> list[str]:
     return [repr(float(number)) for number in numbers]
 
 
-def format_above_limit(value: float, limit: float) -> str:
-    """Format a value above a limit with three digits, or with as many as show that it is above.
+def format_beyond_limit(value: float, limit: float) -> str:
+    """Format a value above or below a limit with three digits, or with as many as show on which side it lies.
 
     Examples
     --------
-    >>> format_above_limit(0.31416, 0.2), format_above_limit(0.20004, 0.2)
-    ('0.314', '0.20004')
+    >>> format_beyond_limit(0.31416, 0.2), format_beyond_limit(0.20004, 0.2), format_beyond_limit(0.19996, 0.2)
+    ('0.314', '0.20004', '0.19996')
     """
+    side = value > limit
     texts = (f"{value:.{digits}g}" for digits in range(3, 17))
-    return next((text for text in texts if float(text) > limit), repr(float(value)))
+    return next(
+        (
+            text
+            for text in texts
+            if float(text) != limit and (float(text) > limit) == side
+        ),
+        repr(float(value)),
+    )
 
 
 def parse_seconds(text: str) -> Decimal | None:

@@ -40,6 +40,11 @@ def find_window(time: Samples, start: float, end: float) -> slice:
     return slice(first, last)
 
 
+def get_ends(time: Samples) -> tuple[float, ...]:
+    """Return the first and the last of the times (n,), empty if there are none; they identify a window of a record."""
+    return (*time[:1].tolist(), *time[-1:].tolist())
+
+
 def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
     """Return the integral of values (n,) or (n, k) from the first time on, in their shape, by the trapezoidal rule.
 

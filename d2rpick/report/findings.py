@@ -196,6 +196,20 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
     )
 
 
+def _make_sarif_help(rule: Rule) -> dict[str, str]:
+    """Return the fix of a rule, and where the documentation explains the rule.
+
+    SARIF wants an absolute address as ``helpUri``; the documentation has none, so its page and anchor are part of the
+    text.
+    """
+    page = f"docs/reference/rules.md#{rule.id.lower()}"
+    command = f"d2rpick rule {rule.id}"
+    return {
+        "text": f"Fix: {rule.fix}\n\nSee {page} in the documentation of d2rpick, or run: {command}",
+        "markdown": f"**Fix.** {rule.fix}\n\nSee `{page}` in the documentation of d2rpick, or run `{command}`.",
+    }
+
+
 def as_sarif(checks: Checks, _: DisplayOptions) -> str:
     """Return SARIF 2.1.0 with all rules; their ids are stable."""
     ids = list(RULES)
@@ -204,7 +218,7 @@ def as_sarif(checks: Checks, _: DisplayOptions) -> str:
             "id": rule.id,
             "shortDescription": {"text": rule.summary},
             "fullDescription": {"text": rule.explanation},
-            "help": {"text": f"Fix: {rule.fix}"},
+            "help": _make_sarif_help(rule),
             "defaultConfiguration": {"level": _SARIF[rule.severity]},
         }
         for rule in RULES.values()

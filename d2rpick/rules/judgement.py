@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, DeckError, give_if_written, name_units
 from d2rpick.choice.answers import PairVerdict, find_better_pair, suggest_at, verify_run
 from d2rpick.choice.health import WRONG_ENERGY
+from d2rpick.choice.pair.quality import list_exceeded_limits
 from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.warnings import (
     POOR_KINETIC_SHARE,
@@ -29,7 +30,7 @@ from d2rpick.flight.contact_times import (
 from d2rpick.histories.contact_forces import find_force
 from d2rpick.histories.digits import (
     convert_to_unit_of_record,
-    format_above_limit,
+    format_beyond_limit,
     round_to_first_as_read,
 )
 from d2rpick.histories.surroundings import UNKNOWN
@@ -278,7 +279,8 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
-    faults = [*_judge_flight(verdict), *_judge_error(verdict)]
+    limit_faults = [*_judge_limits(verdict)]
+    faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
     if not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
@@ -289,6 +291,8 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     elif (
         situation.kinetic_share is not None
         and situation.kinetic_share > POOR_KINETIC_SHARE
+        # one finding for one mistake
+        and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
         cure = "no better td was found"
@@ -368,8 +372,16 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
         else:
             of_parts = ""
         levels = f"the energy{of_parts} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = f"{quantity} {format_above_limit(error, tolerance)}, expected at most {tolerance:g}"
+        expected = f"{quantity} {format_beyond_limit(error, tolerance)}, expected at most {tolerance:g}"
         yield Fault("D2R201", False, f"{levels}: {expected}; {_suggest_cure(verdict)}")
+
+
+def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
+    """Yield an objection for each limit of a recommendation that the pair exceeds."""
+    exceeded = list_exceeded_limits(verdict.situation, verdict.candidate)
+    cure = _suggest_cure(verdict) if exceeded else ""
+    for excess in exceeded:
+        yield Fault("D2R210", excess.is_td_wrong, f"{excess.message}; {cure}")
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:

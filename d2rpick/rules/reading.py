@@ -85,9 +85,8 @@ def _make_elements(keyword: str) -> Example:
 )
 def _check_counts(case: Case) -> Iterator[Objection]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC gives the number of D2R lines (D2R) and of R2D lines (R2D) that
-    follow it, one line per part. If a count is wrong, the solver reads a part from the wrong line, or reads a part line
-    as the next card. If a line is missing, the solver reads the next line in its place. If both counts are 0, the card
-    switches nothing.
+    follow it, one line per part. If a count is wrong or a line is missing, the solver reads a part from the wrong line,
+    or reads a part line as the next card. If both counts are 0, the card switches no part.
 
     Fix: Write one line per part, and set D2R and R2D to the number of these lines.
     """
@@ -127,10 +126,10 @@ def _check_counts(case: Case) -> Iterator[Objection]:
     BOTH,
 )
 def _check_fields(case: Case) -> Iterator[Objection]:
-    """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. Text in the columns of a
-    number, or an undefined parameter, stops the run or, worse, is read as something else. A keyword that resembles a
-    switching card but is none is not read at all. ENDTIM and the DT of *DATABASE_GLSTAT and *DATABASE_MATSUM are
-    checked too, because the switching times are compared with them.
+    """Fields are 10 columns wide (20 in long format), unless the line is separated by commas. If the columns of a
+    number contain text, or a parameter is undefined, the run stops, or the solver reads another value. If a switching
+    keyword is misspelled, the solver ignores the card. d2rpick also checks ENDTIM and the DT of *DATABASE_GLSTAT and
+    *DATABASE_MATSUM, because it compares the switching times with them.
 
     Fix: Move the value into its columns, define the parameter, or correct the keyword.
     """
@@ -176,9 +175,9 @@ def _find_unreadable_members(case: Case) -> Iterator[Problem]:
 )
 def _check_includes(case: Case) -> Iterator[Objection]:
     """d2rpick looks for include files in the folder of the main deck, in the folders of *INCLUDE_PATH and in the folder
-    of the including file. For Radioss it follows #include in the same way. A file that is missing, unreadable or
-    includes itself is reported. It may contain switching cards, rigid bodies, parts or parameters, so the other
-    findings may be incomplete.
+    of the including file. For Radioss it follows #include in the same way. d2rpick reports a file that is missing, that
+    cannot be read, or that includes itself. The file may contain switching cards, rigid bodies, parts or parameters, so
+    the other findings may be incomplete.
 
     Fix: Add the file, correct its name, or add its folder with *INCLUDE_PATH (LS-DYNA). Then run the check again.
     """
@@ -267,8 +266,8 @@ def _check_time_factor(case: Case) -> Iterator[Objection]:
     "D2R303", INFO, "an encrypted block, which may contain switching cards"
 )
 def _report_encrypted(case: Case) -> Iterator[Objection]:
-    """Models of vendors contain encrypted blocks, from BEGIN PGP MESSAGE to END PGP MESSAGE, that only the solver can
-    read. d2rpick cannot check switching cards, parts or parameters in such a block.
+    """Models from vendors may contain encrypted blocks, from BEGIN PGP MESSAGE to END PGP MESSAGE, which only the
+    solver can read. d2rpick cannot check switching cards, parts or parameters in such a block.
 
     Fix: Keep the switching cards outside encrypted blocks, or check the original file before it is encrypted.
     """
@@ -289,7 +288,7 @@ def _report_encrypted(case: Case) -> Iterator[Objection]:
 )
 def _check_truncation(case: Case) -> Iterator[Objection]:
     """A file seems to be truncated if it has no *END (Radioss: /END) and its last line has no line end. A main deck
-    without *END whose last lines are nodes or elements may be truncated too. The last number may have lost its end, and
+    without *END whose last lines are nodes or elements may be truncated too. The last number may be incomplete, and
     switching cards, parts or parameters may be missing. d2rpick parts computes no cost from a truncated mesh.
 
     Fix: Copy or write the file again. If the file is complete, add *END (Radioss: /END) or a line end.
@@ -332,10 +331,10 @@ def _report_untimed(case: Case) -> Iterator[Objection]:
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
     /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
     contact or wall (or the part momenta, if the deck has only one contact or wall), d2rpick finds the switching times
-    from it and judges them. A *SENSOR_CONTROL is evaluated through *SENSOR_SWITCH of the time, or of the magnitude of
-    such a force. That its set is made rigid while the sensor is on, and deformable while it is off, was not tried with
-    the solver. Restarts that are checked together with their main deck have times: each begins at the ENDTIM of the run
-    before it.
+    from it and judges them. d2rpick evaluates a *SENSOR_CONTROL if its *SENSOR_SWITCH depends on the time, or on the
+    magnitude of such a force. It assumes that the parts are rigid while the sensor is on, and deformable while it is
+    off; this was not tested with the solver. If you check restarts together with their main deck, they have times: each
+    restart begins at the ENDTIM of the previous run.
 
     Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
     together with their main deck, or switch by time (CODE 0).

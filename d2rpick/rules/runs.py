@@ -186,8 +186,8 @@ def _check_order(case: RunCase) -> Iterator[Objection]:
 def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
     """/RBODY/ON and /RBODY/OFF list the main nodes of rigid bodies, not the ids of the bodies. The engine skips any
     other node without a message, so the part does not change its state. It also skips the main node of a body that
-    /MERGE/RBODY merges into another one. A 0 is not reported. d2rpick applies this rule only if it could read the
-    starter deck and its includes. Source: Altair's help and the published source of OpenRadioss.
+    /MERGE/RBODY merges into another body. This rule does not report a 0. d2rpick applies this rule only if it could
+    read the starter deck and its includes. Source: Altair's help and the published source of OpenRadioss.
 
     Fix: List the main node of the rigid body, or of the body into which it is merged.
     """
@@ -228,8 +228,8 @@ def _check_main_nodes(case: RunCase) -> Iterator[Objection]:
 )
 def _check_never_off(case: RunCase) -> Iterator[Objection]:
     """A rigid body is active by default from the first engine file on. If no earlier engine file has /RBODY/OFF for it,
-    the part is rigid from time 0, during the load too. A node that D2R402 reports is not reported here. Source:
-    Altair's help for /RBODY in engine files.
+    the part is rigid from time 0, during the load too. If D2R402 reports a node, this rule does not. Source: Altair's
+    help for /RBODY in engine files.
 
     Fix: Add /RBODY/OFF with this main node to the first engine file.
     """
@@ -318,8 +318,8 @@ def _check_on_again(case: RunCase) -> Iterator[Objection]:
 )
 def _check_step_limit(case: RunCase) -> Iterator[Objection]:
     """If nothing deformable is left, the time step grows by 10 % per cycle without limit, and the release at td comes
-    late. /DTIX limits the time step. A limit above 1 % of the rigid window is reported too. A missing limit is reported
-    only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
+    late. /DTIX limits the time step. This rule also reports a limit above 1 % of the rigid window. It reports a missing
+    limit only if every element lies in a rigid part. Source: runs computed with OpenRadioss (td was 0.26 ms late).
 
     Fix: Add /DTIX to the engine file, with a largest time step below 1 % of the rigid window.
     """
@@ -426,9 +426,9 @@ def _check_left_rigid(case: RunCase) -> Iterator[Objection]:
     (RADIOSS,),
 )
 def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
-    """As D2R408, for a rigid body whose parts have internal energy in the history: they deform in the reference run,
-    and cannot deform in this run. If the history has their energy and it is zero, they are meant to be rigid, and
-    nothing is reported.
+    """The rigid body is active from time 0 (D2R408), but its parts have internal energy in the history. They deform in
+    the reference run, and cannot deform in this run. If the history contains their energy and it is zero, the parts are
+    meant to be rigid, and d2rpick reports nothing.
 
     Fix: Add the main node to the /RBODY/OFF of every engine file.
     """
@@ -465,9 +465,9 @@ def _find_left_rigid_parts(
     (RADIOSS,),
 )
 def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
-    """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They follow node
-    groups by nodes, parts and subsets, and the distance from a wall. They do not follow other groups, nodes moved by
-    /TRANSFORM and ids of a //SUBMODEL.
+    """D2R406 and D2R407 check what rigid walls and initial velocities do to the nodes of rigid bodies. They evaluate
+    node groups defined by nodes, parts and subsets, and the distance from a wall. They do not evaluate other groups,
+    nodes moved by /TRANSFORM, and ids of a //SUBMODEL.
 
     Fix: Define the group by /GRNOD/NODE, /GRNOD/PART or /GRNOD/SUBSET, or check walls and velocities yourself.
     """
@@ -494,8 +494,8 @@ def _report_unknown_nodes(case: RunCase) -> Iterator[Objection]:
 )
 def _check_walls(case: RunCase) -> Iterator[Objection]:
     """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, even if the engine deactivates the
-    body in the first engine file (warning 446). These nodes go through the wall. OpenRadioss applies the Ikrem of the
-    /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
+    body in the first engine file (warning 446). These nodes can pass through the wall. OpenRadioss applies the Ikrem of
+    the /RBODY with the highest id to all bodies. With Ikrem 1 the wall acts on the nodes while the body is off, but not
     while it is on. Walls with the penalty formulation (Iform 1, since 2026) keep their nodes. Source: Altair's help for
     /RBODY and /RWALL, the published source of OpenRadioss, and runs computed with it (a car that went through a pole).
 

@@ -303,9 +303,9 @@ def _check_entity_exists(case: Case) -> Iterator[Objection]:
 )
 def _check_entity_triggers(case: Case) -> Iterator[Objection]:
     """Only the force of surface-to-surface and nodes-to-surface contacts triggers a switch. A contact of type GENERAL
-    or SINGLE_SURFACE never does, so the part keeps its state, and the solver issues no message. Source: Vol I, Remark
-    1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not tried with the
-    solver.
+    or SINGLE_SURFACE never triggers a switch, so the part keeps its state, and the solver issues no message. Source:
+    Vol I, Remark 1, as quoted by a public drop tool, and the vendor's help on OFFSET, which lists the same types. Not
+    tested with the solver.
 
     Fix: Define a surface-to-surface or nodes-to-surface contact for the impact, and set ENTNO to its id.
     """
@@ -414,8 +414,8 @@ def _make_delayed_deck(wait: str) -> Example:
 @make_rule_decorator("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
 def _check_delay(case: Case) -> Iterator[Objection]:
     """TIME3 is the time after a switch during which the set makes no further switch. A contact force begins and ends
-    many times in one impact, so with TIME3 = 0 the parts switch back and forth. Of a pair, one set must wait. Source:
-    vendor keyword data for the meaning. A public drop tool reports the repeated switches.
+    many times in one impact, so with TIME3 = 0 the parts switch back and forth. In a pair, one of the two sets needs a
+    TIME3 above 0. Source: vendor keyword data for the meaning. A public drop tool reports the repeated switches.
 
     Fix: Set TIME3 to a time in which the contact settles.
     """
@@ -441,8 +441,8 @@ def _check_delay(case: Case) -> Iterator[Objection]:
     "D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)"
 )
 def _check_entity_named(case: Case) -> Iterator[Objection]:
-    """The set waits for a force that is not zero. If ENTNO is 0, no contact or rigid wall is named, so there is no
-    force to wait for. Source: vendor keyword data. It is not confirmed what the solver does with 0.
+    """The set switches when the force of ENTNO is not zero. ENTNO 0 names no contact or rigid wall, so there is no such
+    force. Source: vendor keyword data. No available source confirms what the solver does with 0.
 
     Fix: Set ENTNO to the id of the contact or rigid wall.
     """
@@ -469,9 +469,9 @@ def _make_landing_deck(wait: str) -> Example:
 def _check_chatter(case: Case) -> Iterator[Objection]:
     """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
     if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
-    history. Rigid windows below 10 % of the longest one are not flights but chatter. They disappear if TIME3 of the set
-    that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick does not see a
-    force that begins and ends within one output interval.
+    history. Rigid windows shorter than 10 % of the longest window are not flights but chatter. There is no chatter if
+    TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick
+    does not see a force that begins and ends within one output interval.
 
     Fix: Raise TIME3 (Radioss: Tdelay) to the value in the finding.
     """

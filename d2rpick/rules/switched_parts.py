@@ -142,8 +142,8 @@ def _check_never_rigid(case: Case) -> Iterator[Objection]:
 @set_failing(Example(_RESTART.format(1, 1)))
 @make_rule_decorator("D2R117", ERROR, "a part made rigid and deformable in one restart")
 def _check_both_ways(case: Case) -> Iterator[Objection]:
-    """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part that
-    both name has no rigid window, or stays rigid to the end: no available source says which.
+    """*RIGID_DEFORMABLE_D2R and *RIGID_DEFORMABLE_R2D of one restart act together when the restart begins. A part on
+    both cards has no rigid window, or stays rigid to the end. No available source confirms which of the two happens.
 
     Fix: Move one of the two cards to another restart.
     """
@@ -165,8 +165,8 @@ def _check_both_ways(case: Case) -> Iterator[Objection]:
 @set_failing(make_deck(THERE), make_deck("*DEFORMABLE_TO_RIGID\n         1\n"))
 @make_rule_decorator("D2R104", INFO, "a part made rigid and never switched back", BOTH)
 def _check_never_back(case: Case) -> Iterator[Objection]:
-    """The part stays rigid to the end of the run, unless a restart deck switches it back. Its deformation in the next
-    contact is missing from the result.
+    """The part stays rigid to the end of the run, unless a restart deck switches it back. It does not deform in the
+    next contact.
 
     Fix: Add an R2D line at td, before the next contact. If the part is meant to stay rigid, silence the finding with a
     comment.
@@ -300,8 +300,8 @@ def _check_always_rigid(case: Case) -> Iterator[Objection]:
     "D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes"
 )
 def _check_shared_nodes(case: Case) -> Iterator[Objection]:
-    """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, each prescribes the motion
-    of these nodes, which they cannot both obey.
+    """With LRB 0 each part becomes a rigid body of its own. If two rigid bodies share nodes, both prescribe the motion
+    of these nodes, which is a contradiction.
 
     Fix: Merge the parts: the lead part has LRB 0, the other parts have LRB = id of the lead part.
     """
@@ -442,11 +442,11 @@ def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
     "D2R116", WARNING, "solids whose stresses do not rotate with the rigid body", BOTH
 )
 def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
-    """While a part is rigid its elements are not computed. Formulations without a co-rotational frame keep their
-    stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid from the
-    start hold no stress and are not reported. Source for Radioss: Altair's help (bricks with Isolid 1 or 2 without
-    Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA it follows from the theory
-    of the formulations; sources disagree on what LS-DYNA does with the stresses.
+    """While a part is rigid, the solver does not compute its elements. Formulations without a co-rotational frame keep
+    their stresses in global axes, so after a rotation they spring back in the wrong direction. Parts that are rigid
+    from the start have no stress, so d2rpick does not report them. Source for Radioss: Altair's help (bricks with
+    Isolid 1 or 2 without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH or HA8). For LS-DYNA it
+    follows from the theory of the formulations; sources disagree on what LS-DYNA does with the stresses.
 
     Fix: Use a co-rotational formulation for these solids, or keep them deformable. If the part rotates little between
     tr and td, the error is small.
@@ -532,7 +532,7 @@ def _check_reference_laws(case: Case) -> Iterator[Objection]:
     """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, not from the
     stress at the time at which the part was made rigid. After the switch back the part may have a stress that it did
     not have before. For Radioss: hyperelastic laws, and solids with Ismstr 10 to 12. Source: the theory of the laws,
-    and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tried with the solver.
+    and a report of 2026 on a hyperelastic solid in LS-DYNA R14. Not tested with the solver.
 
     Fix: Keep the part deformable, or compare its stress after td with the reference run.
     """
@@ -636,9 +636,9 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
 )
 def _check_extra_nodes(case: Case) -> Iterator[Objection]:
     """Extra nodes and joints attach nodes to a rigid body. On a part that a card makes rigid, these nodes belong to two
-    rigid bodies. The vendor asks to delete such constraints on switched parts and to activate them again when the parts
-    are switched back. It is not confirmed whether NRBF or NCSF does this for joints and extra nodes, so either value of
-    1 satisfies this rule.
+    rigid bodies. According to the vendor, such constraints must be deleted on switched parts, and activated again when
+    the parts are switched back. No available source confirms whether NRBF or NCSF does this for joints and extra nodes.
+    So NRBF 1 or NCSF 1 satisfies this rule.
 
     Fix: Set NRBF and NCSF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """

@@ -1,5 +1,5 @@
-"""Rules D2R101-102, D2R105, D2R111, D2R114-115 and D2R201-207: the window times, also compared with an energy
-history.
+"""Rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the window times, also compared with an
+energy history.
 """
 
 from __future__ import annotations
@@ -187,8 +187,8 @@ def _check_zero_times(case: Case) -> Iterator[Objection]:
 )
 def _check_sampling(case: Case) -> Iterator[Objection]:
     """Switching times are chosen from the internal energy of a reference run: glstat has the energy of the whole model,
-    matsum that of each part. If the output interval is too long, the energy at tr and td is not known well enough.
-    Decks that contain only switching cards, and checks with --history, are not judged.
+    matsum that of each part. If the output interval is too long, the energy at tr and td is not known well enough. This
+    rule does not apply to decks that contain only switching cards, or to checks with --history.
 
     Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
@@ -308,9 +308,9 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
     "the switching times are about 1000 times the termination time, or a thousandth of it",
 )
 def _check_units_of_deck(case: Case) -> Iterator[Objection]:
-    """Seconds and milliseconds are mixed: divided or multiplied by 1000, the switching times lie in the run, and as
-    they are they lie outside, or only in its first 1/1000. Files contain no unit names, so d2rpick infers this from the
-    magnitudes. D2R101, which also reports times after the end, is then left out.
+    """The deck seems to mix seconds and milliseconds: the switching times lie outside the run or in its first 1/1000,
+    but would lie in the run if they were divided or multiplied by 1000. Files contain no unit names, so d2rpick infers
+    this from the magnitudes. D2R101 does not report these times again.
 
     Fix: Write the switching times and ENDTIM in the same time unit.
     """
@@ -371,8 +371,8 @@ def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
     BOTH,
 )
 def _check_units_of_history(case: Case) -> Iterator[Objection]:
-    """Decks in microseconds or milliseconds are often checked with a history in seconds. Files contain no unit names,
-    so d2rpick compares the two end times. The finding is left out if D2R115 or D2R207 reports the same mistake.
+    """The deck may be in microseconds or milliseconds, and the history in seconds. Files contain no unit names, so
+    d2rpick compares the two end times. If D2R115 or D2R207 reports the same mistake, this rule does not.
 
     Fix: Give deck and history in the same time unit.
     """
@@ -404,9 +404,9 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
     BOTH,
 )
 def _check_times_of_history(case: Case) -> Iterator[Objection]:
-    """Deck and history have different time units: divided or multiplied by 1000, the windows lie in the history. Files
-    contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the history are reported by
-    D2R205.
+    """Deck and history seem to have different time units: the windows would lie in the history if they were divided or
+    multiplied by 1000. Files contain no unit names, so d2rpick infers this from the magnitudes. Other times outside the
+    history are reported by D2R205.
 
     Fix: Give deck and history in the same time unit.
     """
@@ -435,10 +435,10 @@ def _check_times_of_history(case: Case) -> Iterator[Objection]:
     "D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH
 )
 def _check_locked_in_error(case: Case) -> Iterator[Objection]:
-    """While a part is rigid it keeps the deformation that it had at tr, and it springs back at td. This deformation
-    should be the one that the part would have at td: same energy, same direction. d2rpick judges the parts that share a
-    window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in error
-    if an oscillator describes the history, else the level error.
+    """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
+    should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges the parts that
+    share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in
+    error if an oscillator describes the history, else the level error.
 
     Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
     """
@@ -452,8 +452,8 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 )
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
-    wrong sign is locked in, the vibration after td is worse than with no locked-in energy. The sign is known only if an
-    oscillator describes the history.
+    frozen deformation has the wrong sign, the vibration after td is worse than without any frozen deformation. The sign
+    is known only if an oscillator describes the history.
 
     Fix: Replace tr by the time in the finding, which has the right sign.
     """
@@ -484,12 +484,26 @@ def _check_kinetic_share(case: Case) -> Iterator[Objection]:
 )
 def _check_quality(case: Case) -> Iterator[Objection]:
     """The pair is admissible, but the history shows that the motion or the vibration after td will be wrong, or does
-    not show that they will be right. Judged as d2rpick verify does. --min-quality good also reports pairs that are
-    only fair, --min-quality poor reports none.
+    not show that they will be right. d2rpick judges the pair in the same way as d2rpick verify. With --min-quality
+    good, it also reports fair pairs; with --min-quality poor, it reports no pair.
 
     Fix: Use the pair that the finding names. If it names none, do what it says would improve the pair.
     """
     return _report_faults(case, "D2R209")
+
+
+@set_passing(*_PASSING)
+@set_failing(_make_pair_deck(".0128853", "0.064", "--max-residual 0.5"))
+@make_rule_decorator(
+    "D2R210", ERROR, "a pair beyond a limit, such as --max-residual", BOTH
+)
+def _check_limits(case: Case) -> Iterator[Objection]:
+    """A limit of a recommendation was given, --max-residual or --max-kinetic-share, and the pair exceeds it, or the
+    history does not show whether it does. d2rpick suggest recommends no pair beyond the same limit.
+
+    Fix: Use the pair that the finding names, or one that d2rpick suggest recommends with this limit.
+    """
+    return _report_faults(case, "D2R210")
 
 
 @set_passing(*_PASSING)
@@ -498,9 +512,10 @@ def _check_quality(case: Case) -> Iterator[Objection]:
     "D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH
 )
 def _check_flight(case: Case) -> Iterator[Objection]:
-    """Before the load is over, equal energy is a coincidence, and the motion of the body becomes wrong. After the next
-    contact the part should have deformed. d2rpick finds the begin and end of the flight from the momentum or the energy
-    of the history, or uses the time given by --after. A history that does not show the flight is reported too.
+    """If tr lies before the end of the load, an equal energy is a coincidence, and the motion of the body is wrong. If
+    td lies after the next contact, a rigid part does not deform in this contact. d2rpick finds the start and end of the
+    flight from the momentum or the energy in the history, or uses the time of --after. It also reports a history that
+    does not show the flight.
 
     Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
     --after.
@@ -512,8 +527,9 @@ def _check_flight(case: Case) -> Iterator[Objection]:
 @set_failing(_make_pair_deck(".0135867", "0.16"))
 @make_rule_decorator("D2R205", ERROR, "tr or td outside the reference history", BOTH)
 def _check_in_history(case: Case) -> Iterator[Objection]:
-    """The energy outside the history is unknown, and so is the energy of a part that the history does not contain. A td
-    within the first ten states is reported if 1000 times this td lies in the history: it seems to have another unit.
+    """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.
+    d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td
+    seems to have another unit.
 
     Fix: Correct the time or the part id, or run the reference longer.
     """

@@ -397,7 +397,7 @@ class Observer:
         if not follows:
             self._evidence = GrowingEvidence()
             self._motion = InnerMotion(None, self._of_deck, wait_before)
-        if states is not None and states.time.size:
+        if states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
         history = self._evidence.history

@@ -1,6 +1,6 @@
 """Read the files of a run again and again while it is computed, and give the new states.
 
-Of a Radioss history only the new states are read.  Files of other formats are read as a whole each time.
+Of the histories of solvers only the last states are read again.  Files of other formats are read as a whole each time.
 """
 
 from __future__ import annotations
@@ -8,14 +8,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import FormatError, HistoryError
 from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
-from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
-from d2rpick.histories.opening import Source, open_run, open_sources
-from d2rpick.running.record import list_tables, skip_states
+from d2rpick.histories.opening import Source, open_sources
+from d2rpick.histories.resuming import ResumePoint
+from d2rpick.histories.source import open_files, open_source
+from d2rpick.running.record import find_last_states, skip_states
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
@@ -23,16 +25,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-_HEAD: Final = 8192  # bytes by which a Radioss history is recognised
+# A record with fewer states is read as a whole: what follows from all states, as which parts are springs, may change.
+_FEWEST_STATES: Final = 200
 
 
-class _ReadPart(NamedTuple):
-    """How far a file was read: its head, the bytes of the last state, where they end, and the number of the file."""
+class _ReadFile(NamedTuple):
+    """A file that was read: where the next look begins, and the number of the file in its file system."""
 
-    head: bytes
-    last_state: bytes
-    end: int
+    point: ResumePoint
     inode: int
+
+    def shift(self, point: ResumePoint) -> ResumePoint:
+        """Return a point in the file, from its address behind the head of this one."""
+        skipped = self.point.begin - len(self.point.head)
+        return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
 
 
 class Looks:
@@ -42,17 +48,18 @@ class Looks:
         self, selection: Selection, inventory: Inventory | None = None
     ) -> None:
         self._selection, self._inventory = selection, inventory
-        self._read_parts: dict[str, _ReadPart] = {}
-        self._last_time = float("-inf")
-        self._known_tables: list[Table] = []  # of files that are read as a whole
+        self._last_states: list[Table] = []
+        # Files in which the next look reads on, and all files of the last look.
+        self._read_files: dict[str, _ReadFile] = {}
+        self._names: frozenset[str] = frozenset()
 
     @property
     def grow(self) -> bool:
-        """Return True if the format lets new states be read without the states before them."""
-        return bool(self._read_parts)
+        """Return True if the next look reads the last states only."""
+        return bool(self._read_files)
 
-    def new_states(self, names: Sequence[str]) -> tuple[History | None, bool]:
-        """Read the new states, None if there are none, and whether they follow the states that were read before.
+    def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
+        """Read the new states, and whether they follow the states that were read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -63,95 +70,105 @@ class Looks:
         OSError
             If a file is no longer there.
         """
-        sources = self._read_new(names)
-        history = None
-        if sources:
-            history = self._make_history(open_sources(sources, self._selection))
-        follows = (
-            history is None
-            or not history.time.size
-            or float(history.time[0]) > self._last_time
-        )
-        if sources is None or not follows:
-            self._read_parts.clear()
+        if not self._names <= {*names}:
+            self._read_files, self._last_states = {}, []  # a file is gone
+        history = self._read_on(names)
+        new_states = None
+        if history is not None:
+            new_states = skip_states(history, self._last_states)
+        if history is None or new_states is None:
             history = self.whole(names)
-            if len(list_tables(history)) < len(self._known_tables):
-                return (
-                    None,
-                    True,
-                )  # its last state is being written and lacks quantities
-            new_states = self._skip_known(history)
-            follows = new_states is not None
-            history = history if new_states is None else new_states
-        if history is not None and history.time.size:
-            self._last_time = float(history.time[-1])
-        return history, follows and self._last_time > float("-inf")
-
-    def _skip_known(self, history: History) -> History | None:
-        """Return the new states of files that were read as a whole; None if they do not follow those before."""
-        known_tables, self._known_tables = self._known_tables, []
-        if self._read_parts:
-            return None
-        self._known_tables = list_tables(history)
-        return skip_states(history, known_tables) if known_tables else None
+            new_states = skip_states(history, self._last_states)
+        follows = new_states is not None
+        if new_states is None:
+            new_states, self._last_states = history, []
+        self._names = frozenset(names)
+        self._last_states = find_last_states(new_states, self._last_states)
+        return new_states, follows
 
     def whole(self, names: Sequence[str]) -> History:
         """Read all states of the files; errors as `new_states`."""
-        history = self._make_history(open_run(names, self._selection))
-        for name in names:
-            with Path(name).open("rb") as stream:
-                if recognises(stream.read(_HEAD)):
-                    stream.seek(0)
-                    self._note_read(name, stream.read(), 0)
+        self._read_files = {}
+        sources = open_files(names)
+        history, points = self._open(sources)
+        is_packed = any(source.packed is not None for source in sources)
+        if history.time.size >= _FEWEST_STATES and not is_packed:
+            self._note_read(points)
         return history
 
-    def _read_new(self, names: Sequence[str]) -> list[Source] | None:
-        """Return the head of each file with its new states; None if a file was written anew or has another format."""
-        if not self._read_parts or not {*self._read_parts} <= {*names}:
+    def _read_on(self, names: Sequence[str]) -> History | None:
+        """Read the last states of each file, those that were known among them, and the whole of new files.
+
+        Return None if a file was written anew, or if one of the files cannot be read from its middle.
+        """
+        sources = self._list_last_pieces(names)
+        if not sources:
             return None
+        try:
+            history, points = self._open(sources)
+        except (FormatError, HistoryError):  # a file was written anew
+            return None
+        for name, read_file in self._read_files.items():
+            if name in points:
+                points[name] = read_file.shift(points[name])
+        self._note_read(points)
+        return history
+
+    def _list_last_pieces(self, names: Sequence[str]) -> list[Source]:
+        """Return the head and the last states of each file; [] if a file was written anew."""
+        if not self._read_files:
+            return []
         sources = []
         for name in names:
-            read_part = self._read_parts.get(name)
-            data = _read_file(name) if read_part is None else _read_on(name, read_part)
-            if data is None:
-                return None
-            skipped = read_part.end - len(read_part.head) if read_part else 0
-            if self._note_read(name, data, skipped):
-                sources.append(Source(name, data))
+            read_file = self._read_files.get(name)
+            if read_file is not None:
+                status = Path(name).stat()
+                is_same = status.st_ino == read_file.inode
+                if not is_same or status.st_size < read_file.point.begin:
+                    return []
+                sources.append(Source(name, read_file.point.read_on(name)))
+            elif name not in self._names:
+                sources.append(open_source(name))
         return sources
 
-    def _note_read(self, name: str, data: bytes, skipped: int) -> bool:
-        """Note how far a file was read, ``skipped`` bytes before ``data``; return whether that has a whole state."""
-        history = TimeHistory(data, name)
-        begin, end = history.size_until(float("-inf")), history.size_until(float("inf"))
-        if end > begin:
-            state_size = (end - begin) // history.time.size
-            self._read_parts[name] = _ReadPart(
-                data[:begin],
-                data[end - state_size : end],
-                skipped + end,
-                Path(name).stat().st_ino,
-            )
-        return end > begin
+    def _open(
+        self, sources: Sequence[Source]
+    ) -> tuple[History, dict[str, ResumePoint]]:
+        """Return the history in some files, without a last state that is not whole, and where to read on in them.
 
-    def _make_history(self, run: OpenedRun) -> History:
-        return Reference.of(
-            add_surroundings(run, self._inventory), self._selection
-        ).history
+        The places are {} if the format of a file is always read as a whole.
+        """
+        run = open_sources(sources, self._selection)
+        points = _find_resume_points(run)
+        whole_states = [_cut_half_state(source, points) for source in sources]
+        if whole_states != [*sources]:
+            run = open_sources(whole_states, self._selection)
+            points = _find_resume_points(run)
+        run = add_surroundings(run, self._inventory)
+        return Reference.of(run, self._selection).history, points
 
-
-def _read_file(name: str) -> bytes | None:
-    """Return the content of a Radioss history; None if the file has another format."""
-    data = Path(name).read_bytes()
-    return data if recognises(data[:_HEAD]) else None
+    def _note_read(self, points: Mapping[str, ResumePoint]) -> None:
+        """Note where the next look reads on; files without a point, as those with forces only, are not read again."""
+        self._read_files = {
+            name: _ReadFile(point, Path(name).stat().st_ino)
+            for name, point in points.items()
+        }
 
 
-def _read_on(name: str, read_part: _ReadPart) -> bytes | None:
-    """Return the head of a file and what follows the states that were read; None if it was written anew."""
-    if Path(name).stat().st_ino != read_part.inode:
-        return None
-    with Path(name).open("rb") as stream:
-        stream.seek(read_part.end - len(read_part.last_state))
-        if stream.read(len(read_part.last_state)) != read_part.last_state:
-            return None
-        return read_part.head + stream.read()
+def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
+    """Return where to read on in the files of a run; {} if the format of one is always read as a whole."""
+    points: dict[str, ResumePoint] = {}
+    for database in run.databases:
+        points_of_format = database.find_resume_points()
+        if not points_of_format:
+            return {}
+        points |= points_of_format
+    return points
+
+
+def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:
+    """Return a file without a last state that lacks some of its lines."""
+    point = points.get(source.name)
+    if point is None or point.end == len(source.data):
+        return source
+    return source._replace(data=source.data[: point.end])

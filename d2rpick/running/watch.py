@@ -132,7 +132,7 @@ class Watch:
         if not names:
             return
         states, follows = self._looks.new_states(names)
-        if states is None or not states.time.size:
+        if not states.time.size:
             return
         balance = states.balance
         if not states.momenta and (balance is None or balance.sliding is None):

@@ -56,11 +56,13 @@ class VibratingTogether(Protocol):
 
 if TYPE_CHECKING:
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[[History, Span, VibratingTogether], SignedModel | None]
+    Finder: TypeAlias = Callable[
+        [History, Span, VibratingTogether, Memory], SignedModel | None
+    ]
 
 
 def _find_parts(
-    history: History, within: Span, _: VibratingTogether
+    history: History, within: Span, _: VibratingTogether, __: Memory
 ) -> SignedModel | None:
     """Determine the signs of single parts if their energies are written."""
     time = history.between(*within)[0]
@@ -77,14 +79,15 @@ def _find_parts(
 
 
 def _find_modal(
-    history: History, within: Span, together: VibratingTogether
+    history: History, within: Span, together: VibratingTogether, memory: Memory
 ) -> SignedModel | None:
     """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if written."""
     if not together.complete:
         return None
     from d2rpick.vibration.modal import confirm_by_kinetic_energy, identify_modal
+    from d2rpick.vibration.modal_span import identify_window
 
-    internal = identify_modal(*history.between(*within))
+    internal = identify_window(history, within, memory)
     kinetic = together.kinetic
     return confirm_by_kinetic_energy(
         internal, identify_modal(*kinetic, kinetic=True) if kinetic else None
@@ -92,7 +95,7 @@ def _find_modal(
 
 
 def _find_swings(
-    history: History, within: Span, _: VibratingTogether
+    history: History, within: Span, _: VibratingTogether, __: Memory
 ) -> SignedModel | None:
     """Count the oscillations of the energy, provided that they return to a common minimum."""
     from d2rpick.vibration.swings import count_swings
@@ -125,6 +128,8 @@ def find_models(
     The window ``around`` td is used, for models after the oscillator the ``flight`` if one is known, and for swings
     also the time before it, from when the energy has ``settled``.
     """
+    from d2rpick.histories.samples import get_ends
+
     models: dict[str, SignedModel] = {}
     span = around
     for basis, find in MODELS.items():
@@ -134,9 +139,13 @@ def find_models(
             span = flight
         if basis == "swings" and settled is not None:
             span = settled
-        if find and (
-            model := memory.once((basis, *span), partial(find, history, span, together))
-        ):
+        if find is None:
+            continue
+        model = memory.once(
+            (basis, *get_ends(history.between(*span)[0])),
+            partial(find, history, span, together, memory),
+        )
+        if model is not None:
             models[basis] = model
             if model.signed and not _is_vague(model):
                 break

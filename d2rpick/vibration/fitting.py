@@ -58,10 +58,9 @@ CERTAIN: Final = (
     0.01  # unexplained share of the variance below which no second start is tried
 )
 _MAX_STEPS: Final = 40
-_USUAL: Final = 10  # usual number of steps; a good start needs 4 to 8
-# A rate below 1/50 turn over the record is a drift.
-# In 2,000 fits no rate below 5 times this limit became a full period.
-_DRIFT: Final = 0.02 * 2 * np.pi
+# Rate over the record below which a fit to some of the samples is a drift, 1/10 period: of 2,000 such fits none
+# reached a period when it was refined for all samples.
+_DRIFT: Final = 0.1 * 2 * np.pi
 
 # A parameter with smaller derivatives, for energies of about 1, has no effect; their squares underflow.
 _NO_EFFECT: Final = 1e-100
@@ -80,24 +79,24 @@ def fit_few(
 ) -> Samples | None:
     """Return least-squares parameters for a selection of samples: the first ``size`` are free, the others zero.
 
-    None if the fit leaves more than ``worst`` of the variance.
+    None if the fit leaves more than ``worst`` of the variance or, if ``worst`` is finite, too much structure.
     """
     few_states = _take_few(s, e)
-    return refine(
-        _find_starts(poles, *few_states, size=size),
-        partial(compute_energy_and_jacobian, size=size),
-        *few_states,
-        worst,
+    model = partial(compute_energy_and_jacobian, size=size)
+    best = refine(
+        _find_starts(poles, *few_states, size=size), model, *few_states, worst
     )
+    quick = np.isfinite(worst)
+    if best is None or (quick and _is_structured(best, model, *few_states)):
+        return None
+    return best
 
 
 def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
-    """Return the parameters for all samples, started from those of `fit_few`; None as in `fit_all`."""
-    best = fit_all(
-        few, partial(compute_energy_and_jacobian, size=size), s, e, worst, slice(1)
-    )
+    """Return the parameters for all samples from those of `fit_few`; None under the conditions of `fit_all`."""
+    best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
     if best[5] < 0:  # q and -q have the same energy, so the preload is made positive
@@ -113,38 +112,31 @@ def fit_all(
     s: Samples,
     e: Samples,
     worst: float,
-    rates: slice,
 ) -> Samples | None:
     """Return the best fit to all samples, started from the ``best`` fit to a selection of them.
 
-    ``rates`` are the indices of the rates among the parameters.  None without a start, or if ``worst`` is finite and
-    some of the samples are left with too much structure.  A fit that leaves far too much is not refined for all
-    samples, since it will be refused and would converge slowly; so would a drift that follows the samples.
+    None without a start, or if ``worst`` is finite and some of the samples are left with too much structure.  A fit
+    that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
+    slowly.
     """
-    quick = np.isfinite(worst)
-    few_states = _take_few(s, e)
-    if best is None or (quick and _is_structured(best, model, *few_states)):
-        return None
-    if few_states[0].size == s.size:
+    if best is None or s.size <= COARSE:
         return best
     some_states = _take_few(s, e, _MEDIUM)
     if some_states[0].size < s.size:
-        best, steps_left = refine_parameters(best, model, *some_states, near=_NEAR)
-        if quick and _is_structured(best, model, *some_states):
+        best, left_over = refine_parameters(best, model, *some_states, near=_NEAR)
+        if np.isfinite(worst) and _is_structured(best, model, *some_states):
             return None
-        if steps_left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some_states[0].size * float(
-            np.var(some_states[1])
-        ):
+        variance = some_states[0].size * float(np.var(some_states[1]))
+        if left_over > _FAR_TOO_MUCH * MAX_MISFIT**2 * variance:
             return best
+    if _is_drift(best):
+        return refine_parameters(best, model, *some_states)[0]
+    return refine_parameters(best, model, s, e)[0]
 
-    def doomed(found: Samples) -> bool:
-        """Return True if these parameters are certain to be refused."""
-        if not quick or np.abs(found[rates]).min() > _DRIFT:
-            return False
-        remainder = e - evaluate_energies(found, model, s)[0]
-        return measure_structure(remainder) < MAX_STRUCTURE * float(np.std(e))
 
-    return refine_parameters(best, model, s, e, doomed=doomed)[0]
+def _is_drift(parameters: Samples) -> bool:
+    """Return True if the rate is so low that more samples do not make a vibration of it."""
+    return bool(abs(parameters[0]) < _DRIFT)
 
 
 def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
@@ -294,7 +286,6 @@ def refine_parameters(
     e: Samples,
     hopeless: float = np.inf,
     near: float = 1e-12,
-    doomed: Callable[[Samples], bool] = lambda _: False,
 ) -> tuple[Samples, float]:
     """Refine parameters by the Levenberg-Marquardt method; return them and the sum of squares.
 
@@ -323,9 +314,7 @@ def refine_parameters(
                 break
         else:
             damping *= 10
-        if expected <= near * cost + 1e-31 * e.size or (
-            steps_left == _MAX_STEPS - _USUAL and doomed(parameters)
-        ):
+        if expected <= near * cost + 1e-31 * e.size:
             break
     return parameters, cost
 

@@ -9,6 +9,7 @@ number of them goes on as the record does.
 
 from __future__ import annotations
 
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -74,6 +75,20 @@ class Grid(NamedTuple):
     def first(self, count: int) -> Grid:
         """Return a grid with the first ``count`` blocks."""
         return self._replace(time=self.time[:count], energy=self.energy[:count])
+
+    def waves(self, poles: Complex) -> Complex:
+        """Return exp(p (t - t_0)) at the m times of the grid, t_0 the first, shape (m, poles) [-].
+
+        On an even grid each is a product of two of about sqrt(m) exponentials, which are dearer than products.
+        """
+        count = self.time.size
+        width = ceil(sqrt(count))
+        inner = np.arange(width) * self.step
+        outer = np.arange(0, count, width) * self.step
+        products = np.exp(np.multiply.outer(outer, poles))[:, np.newaxis] * np.exp(
+            np.multiply.outer(inner, poles)
+        )
+        return products.reshape(-1, poles.size)[:count]
 
     def gain(self, poles: Complex) -> Complex:
         """Return the mean of ``exp(p t)`` over a block relative to its middle value, of the shape of ``poles``."""
@@ -274,9 +289,7 @@ def fit_spectrum(
     """
     lines, mean = _split(poles, span, every_decay=every_decay)
     all_poles = np.concatenate([lines, mean])
-    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], all_poles)) * grid.gain(
-        all_poles
-    )
+    waves = grid.waves(all_poles) * grid.gain(all_poles)
     swinging = all_poles.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
     solution = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import compute_median
+from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
 from d2rpick.vibration.span import Span
 
@@ -68,7 +68,7 @@ def _described_from(
 
 
 def _look_in(history: History, window: Span, memory: Memory) -> ModalWindow | None:
-    vibration = _identify_window(history, window, memory)
+    vibration = identify_window(history, window, memory)
     if vibration is None or not vibration.convinces:
         return None
     return _grow_window(history, ModalWindow(vibration, window), memory)
@@ -102,12 +102,12 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
     )
 
 
-def _identify_window(
+def identify_window(
     history: History, window: Span, memory: Memory
 ) -> ModalVibration | None:
-    return memory.once(
-        ("lines", *window), lambda: identify_modal(*history.between(*window))
-    )
+    """Identify the modes of the states in a window, once for all windows that hold the same states."""
+    time, energy = history.between(*window)
+    return memory.once(("lines", *get_ends(time)), lambda: identify_modal(time, energy))
 
 
 def _grow_window(
@@ -118,7 +118,7 @@ def _grow_window(
         span = _find_reach(history, described)
         if span == described.span:
             break
-        vibration = _identify_window(history, span, memory)
+        vibration = identify_window(history, span, memory)
         if vibration is None or not vibration.convinces:
             break
         described = ModalWindow(vibration, span)

@@ -11,7 +11,7 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import History, Memory, Samples
-from d2rpick.histories.samples import integrate_by_trapezia
+from d2rpick.histories.samples import get_ends, integrate_by_trapezia
 from d2rpick.vibration.fitting import average_cells
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.modes import BLOCK, Mode
@@ -379,12 +379,9 @@ class Fits(Memory):
         def fit(
             time: Samples, energy: Samples, *, quick: bool = False
         ) -> Identification:
-            window = (
-                *time[:1].tolist(),
-                *time[-1:].tolist(),
-            )  # all from one record, so the ends identify the samples
             return self.once(
-                (name, quick, *window), lambda: fitter(time, energy, quick=quick)
+                (name, quick, *get_ends(time)),
+                lambda: fitter(time, energy, quick=quick),
             )
 
         return fit

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from d2rpick.api.arguments import Choosing
+from d2rpick.api.choosing import Choosing
 from d2rpick.histories.content import OnDisk
 from tests.command import DECK, ENERGY, GLSTAT, MATSUM, put
 from tests.sample_deck import DECK as SAMPLE_DECK

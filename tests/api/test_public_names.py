@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from d2rpick.api.arguments import Choosing
+from d2rpick.api.choosing import Choosing
 from tests.command import ENERGY, ROOT
 from tests.examples import PAGES, read_page
 

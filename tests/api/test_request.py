@@ -4,10 +4,13 @@ from typing import Any
 
 import pytest
 
-from d2rpick.api.arguments import Choosing
+from d2rpick.api.choosing import Choosing, JudgingOptions
 from d2rpick.api.request import OPTIONS, OSCILLATOR, Request
 from d2rpick.base.errors import ArgumentError
+from d2rpick.choice.options import CHOOSING_FOR_CARDS, ChoiceOptions
 from d2rpick.choice.parts.cost import Weights
+from d2rpick.choice.question import Settings
+from tests.generated_arguments import MODULE, write_module
 
 ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
 
@@ -61,3 +64,18 @@ def test_what_contradicts_itself_is_refused(
 def test_every_keyword_of_python_is_an_option() -> None:
     assert Choosing.__annotations__.keys() - OPTIONS.keys() == {"oscillator", "replay"}
     assert {*OSCILLATOR} <= OPTIONS.keys()
+
+
+def test_the_arguments_of_python_follow_from_the_table_of_options() -> None:
+    assert MODULE.read_text("utf-8") == write_module()
+    assert {*ChoiceOptions.__annotations__} <= {*Choosing.__annotations__}
+    assert {*CHOOSING_FOR_CARDS} == {*JudgingOptions.__annotations__}
+
+
+def test_what_the_question_leaves_open_is_decided_by_the_settings() -> None:
+    settings = Request(max_residual=0.3).settings
+    assert (settings.max_residual, settings.min_quality, settings.step_ratio) == (
+        0.3,
+        Settings().min_quality,
+        Settings().step_ratio,
+    )

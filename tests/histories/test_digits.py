@@ -3,7 +3,7 @@
 from hypothesis import example, given, strategies as st
 
 from d2rpick.histories.digits import (
-    format_above_limit,
+    format_beyond_limit,
     format_distinctly,
     format_window,
     round_as_read,
@@ -40,7 +40,7 @@ def test_a_window_that_is_read_lies_in_the_window(start: float, length: float) -
 def test_what_is_above_a_limit_reads_as_above_it(limit: float, more: float) -> None:
     value = limit + more
     assert value == limit or limit < float(
-        format_above_limit(value, limit)
+        format_beyond_limit(value, limit)
     ) <= value * (1 + 5e-3)
 
 

@@ -12,9 +12,11 @@ from d2rpick.report import findings as report, formats
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, write_automatic_card
+from tests.command import ROOT
 from tests.deck.test_radioss_run import write_run
 from tests.decks import write
 from tests.json_schemas import check_by_schema, check_junit, check_sarif
+from tests.test_docs import list_anchors
 
 BAD = (
     HEAD
@@ -115,6 +117,17 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
         "artifactLocation": {"uri": "main.k"},
         "region": {"startLine": 23, "startColumn": 28},
     }
+
+
+def test_sarif_names_the_page_of_each_rule(tmp_path: Path) -> None:
+    (run,) = json.loads(write_findings("sarif", [], tmp_path))["runs"]
+    rules = run["tool"]["driver"]["rules"]
+    for rule in rules:
+        for text in (rule["help"]["text"], rule["help"]["markdown"]):
+            page, anchor = re.findall(r"(docs/[a-z/]+\.md)#(d2r\d{3})", text)[0]
+            assert anchor == rule["id"].lower()
+            assert anchor in list_anchors(ROOT / page)
+            assert RULES[rule["id"]].fix in text
 
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:

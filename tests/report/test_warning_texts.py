@@ -35,6 +35,6 @@ def test_an_explanation_has_short_sentences(code: str) -> None:
 def test_the_command_explains_a_warning_by_its_code() -> None:
     text = join_wrapped_lines(run("rule", "poor-td").stdout)
     assert text.startswith("poor-td (warning): More than half of the vibration energy")
-    assert " Fix: Choose the td that is named as better" in text
+    assert " Fix: Choose a td near a peak of the internal energy." in text
     refused = run("rule", "no-such-code")
     assert refused.exit_code == 2

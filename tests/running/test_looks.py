@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.history import Samples
+from d2rpick.histories.history import History, Samples
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.events import Event
 from d2rpick.running.looks import Looks
 from d2rpick.running.watch import Watch
 from tests.command import ROOT
+from tests.made_binout import make_binout
 from tests.written_runs import FALL_WRITERS, WRITERS, Written, as_glstat
 
 LEGS = [
@@ -35,7 +36,7 @@ def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
             Path(names[leg]).write_bytes(data[: int(share * len(data))])
             states, follows = looks.new_states(names[: leg + 1])
             assert follows is bool(times)
-            if states is None:
+            if not states.time.size:
                 continue
             assert not times or states.time[0] > times[-1][-1]
             times.append(states.time)
@@ -69,7 +70,6 @@ def test_files_that_were_written_anew_are_read_as_a_whole(
     remaining_names = names[:1]
     states, follows = looks.new_states(remaining_names)
     assert not follows
-    assert states is not None
     assert np.array_equal(
         states.time, open_run(remaining_names).history(Selection()).time
     )
@@ -86,6 +86,16 @@ def make_falling_masses() -> Written:
     kinetic = (momentum**2).sum(axis=2) / (2 * masses)
     internal = np.outer(1 + np.cos(60 * time) ** 2, [1.0, 1.0, 0.0])
     return Written(time, momentum, kinetic, internal, 0 * time, masses, 0 * time)
+
+
+def cut_run(run: Written, count: int) -> Written:
+    """Return a copy of the first states of a run."""
+    columns = {
+        name: column[:count].copy()
+        for name, column in run._asdict().items()
+        if name != "masses"
+    }
+    return run._replace(**columns)
 
 
 def _find_state(data: bytes, share: float) -> int:
@@ -110,8 +120,6 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
             states, follows = looks.new_states([str(path)])
         except FormatError:  # a table that ends in the middle of a number
             continue
-        if states is None:
-            continue  # its last state is being written
         if not follows:
             times, energies = [], []
         times.append(states.time)
@@ -120,7 +128,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
     assert np.array_equal(np.concatenate(energies), whole.energy)
     assert not times[-1].size  # nothing was written since the previous look
     assert len(times) > 2
-    assert not looks.grow
+    assert looks.grow is (form != "momenta")
 
 
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
@@ -129,20 +137,93 @@ def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
     """Its numbers change, so results derived from it are discarded."""
     run, looks = make_falling_masses(), Looks(Selection())
     for last_energy in (7.0, 8.0):
-        internal = run.internal[:200].copy()
-        internal[-1] = last_energy
-        cut = run._replace(
-            time=run.time[:200],
-            momentum=run.momentum[:200],
-            kinetic=run.kinetic[:200],
-            internal=internal,
-            work=run.work[:200],
-            damped=run.damped[:200],
-        )
+        cut = cut_run(run, 200)
+        cut.internal[-1] = last_energy
         states, follows = looks.new_states([as_glstat(cut, tmp_path)])
-        assert states is not None
         assert states.time.size == 200
         assert not follows
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum", "binout", "t01"])
+def test_a_later_look_does_not_read_the_states_before_the_last_ones(
+    tmp_path: Path, form: str
+) -> None:
+    path = Path(FORMS[form](make_falling_masses(), tmp_path))
+    data, looks = path.read_bytes(), Looks(Selection())
+    whole = open_run([str(path)]).history(Selection())
+    path.write_bytes(data[: int(0.7 * len(data))])
+    before = looks.new_states([str(path)])[0]
+    size = len(data) // 10
+    with path.open("r+b") as stream:  # the same file
+        stream.seek(3 * size)
+        stream.write(b"?" * size)
+        stream.seek(0, 2)
+        stream.write(data[int(0.7 * len(data)) :])
+    states, follows = looks.new_states([str(path)])
+    assert follows
+    assert np.array_equal(np.append(before.time, states.time), whole.time)
+    for momenta, momenta_before, momenta_of_whole in zip(
+        states.momenta, before.momenta, whole.momenta, strict=True
+    ):
+        together = np.append(momenta_before.values, momenta.values, axis=0)
+        assert np.array_equal(together, momenta_of_whole.values)
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum", "binout"])
+@pytest.mark.parametrize("state_count", [12, 210])
+def test_a_state_that_is_being_written_is_left_out_wherever_the_file_ends(
+    tmp_path: Path, form: str, state_count: int
+) -> None:
+    """What is written of it would lack the velocities or the momenta that show a force."""
+    path = Path(FORMS[form](cut_run(make_falling_masses(), state_count), tmp_path))
+    data, looks = path.read_bytes(), Looks(Selection())
+    whole = open_run([str(path)]).history(Selection())
+    pieces = list[History]()
+    begin = len(data) - len(data) // state_count - 20
+    for size in (*range(begin, len(data), 17), len(data)):
+        path.write_bytes(data[:size])
+        first_look, _ = Looks(Selection()).new_states([str(path)])
+        assert len(first_look.momenta) == 1
+        states, follows = looks.new_states([str(path)])
+        assert follows is bool(pieces)
+        pieces.append(states)
+        assert sum(piece.time.size for piece in pieces) == first_look.time.size
+    assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
+
+
+def test_a_run_is_watched_from_a_look_at_a_state_that_is_half_written(
+    tmp_path: Path,
+) -> None:
+    path = Path(as_glstat(make_falling_masses(), tmp_path))
+    path.write_bytes(path.read_bytes().rpartition(b" global x velocity")[0])
+    begun, *_ = Watch([str(path)], Selection()).news()
+    assert begun.event == "begun"
+    assert begun.seen == pytest.approx(1 - 1 / 400)  # of the last but one state
+
+
+@pytest.mark.parametrize("relative", [False, True])
+@pytest.mark.parametrize("every", [1, 3])
+def test_both_branches_of_a_binout_are_read_on_wherever_it_ends(
+    tmp_path: Path,
+    relative: bool,
+    every: int,
+) -> None:
+    path, looks = tmp_path / "binout", Looks(Selection())
+    writer = make_binout(range(1, 241), relative=relative, matsum_every=every)
+    data = bytes(writer.data)
+    path.write_bytes(data)
+    whole = open_run([str(path)]).history(Selection())
+    pieces = list[History]()
+    for mark in (*writer.marks[-280::9], len(data)):
+        path.write_bytes(data[: mark + 5])
+        states, follows = looks.new_states([str(path)])
+        assert follows is bool(pieces)
+        assert looks.grow
+        pieces.append(states)
+    assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
+    for number, momenta in enumerate(whole.momenta):
+        values = [piece.momenta[number].values for piece in pieces]
+        assert np.array_equal(np.concatenate(values), momenta.values)
 
 
 @pytest.mark.parametrize("form", ["glstat", "matsum", "binout"])

@@ -84,7 +84,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """Error by which candidates are ranked [-]: the residual, or the level error on basis "energy"; infinite if unknown."""
+        """Error by which candidates are ranked [-]: the residual, on basis "energy" the level error; infinity if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
@@ -113,7 +113,7 @@ class Judged:
 
     All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``place`` is the index
     into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``, ``level_error``,
-    ``same_swing`` and ``position_error``, NaN for unknown values.
+    ``same_swing``, ``position_error`` and ``rigid_time``, NaN for unknown values.
     """
 
     situations: Sequence[Situation]
@@ -167,6 +167,7 @@ class Judged:
             "level_error": level_error,
             "same_swing": (turns_to_td - turns_to_tr < 2) & ~at_rest,
             "position_error": position_error,
+            "rigid_time": td[place] - tr,
         }
         problems = tuple(list_objections(situations, place, tr, columns))
         return cls(situations, place, moments, columns, problems)
@@ -194,18 +195,22 @@ class Judged:
     @property
     def kept(self) -> NDArray[np.bool_]:
         """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
-        settings = self.situations[0].settings
-        keeps = self.acceptable
-        if settings.max_kinetic_share is not None:
-            shares = [
-                np.inf if situation.kinetic_share is None else situation.kinetic_share
-                for situation in self.situations
-            ]
-            keeps = keeps & (np.array(shares) <= settings.max_kinetic_share)[self.place]
-        if settings.max_residual is not None:
-            # False if the residual is unknown, NaN
-            keeps = keeps & (self.columns["residual"] <= settings.max_residual)
+        return self.acceptable & self.within_limits
+
+    @property
+    def within_limits(self) -> NDArray[np.bool_]:
+        """True for each candidate that exceeds no limit of the settings, shape (n,)."""
+        keeps = np.ones(self.place.size, np.bool_)
+        for limit, value in self.situations[0].settings.limits:
+            keeps &= limit.is_kept_by(self.get_quantity(limit.quantity), value)
         return keeps
+
+    def get_quantity(self, name: str) -> Samples:
+        """Return a quantity of each candidate by name, shape (n,): a column, or an attribute of its situation."""
+        if name in self.columns:
+            return self.columns[name]
+        values = [getattr(situation, name) for situation in self.situations]
+        return np.array(values, np.float64)[self.place]
 
     @property
     def error(self) -> Samples:
@@ -365,7 +370,6 @@ class Candidates(Sequence[Candidate]):
             kind=kind,
             level_ratio=level_ratio,
             rising=rising,
-            rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
             tr_high=tr + reach,

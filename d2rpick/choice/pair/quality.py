@@ -13,7 +13,6 @@ from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
 from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
-from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
@@ -70,13 +69,14 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
     longest, those with a large position error come after the others.  The rest follows by error.
     """
-    rigid = judged.td - judged.moments.tr
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
     room = np.repeat(
         [get_limit_of_like_quality(situation) for situation in judged.situations], 3
     )
-    rows = order_by_quality(group, judged.error, rigid, judged.out_of_place, room)
+    rows = order_by_quality(
+        group, judged.error, judged.columns["rigid_time"], judged.out_of_place, room
+    )
     is_kept = judged.kept[rows]
     for situation, (first, last) in zip(
         judged.situations, pairwise(judged.ends), strict=True
@@ -138,23 +138,28 @@ def _find_extremes(
     return extremes
 
 
-def list_exceeded_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
-    """Return a message for each of --max-kinetic-share and --max-residual that is exceeded or cannot be judged."""
-    settings = situation.settings
-    limits = (
-        ("kinetic share", situation.kinetic_share, settings.max_kinetic_share),
-        ("residual", candidate.residual, settings.max_residual),
-    )
-    messages = []
-    for name, value, limit in limits:
-        if limit is None:
-            continue
-        if value is None:
-            messages.append(f"{name} unknown, at most {limit:g} was asked for")
-        elif value > limit:
-            exceeding = format_above_limit(value, limit)
-            messages.append(f"{name} {exceeding} above the limit {limit:g}")
-    return tuple(messages)
+class Excess(NamedTuple):
+    """A limit of a recommendation that a pair exceeds, or that cannot be judged, with its ``message``.
+
+    ``is_td_wrong``: the value is known, and belongs to td, so that no tr helps.
+    """
+
+    message: str
+    is_td_wrong: bool
+
+
+def list_exceeded_limits(
+    situation: Situation, candidate: Candidate
+) -> tuple[Excess, ...]:
+    """Return the limits of the settings that a candidate exceeds, or that cannot be judged."""
+    exceeded = []
+    for limit, value in situation.settings.limits:
+        of_td = limit.quantity not in candidate._fields
+        quantity = getattr(situation if of_td else candidate, limit.quantity)
+        if quantity is None or not limit.is_kept_by(quantity, value):
+            is_td_wrong = of_td and quantity is not None
+            exceeded.append(Excess(limit.explain(quantity, value), is_td_wrong))
+    return tuple(exceeded)
 
 
 class Cause(NamedTuple):

@@ -16,7 +16,7 @@ from d2rpick.choice.pair.few_states import warn_about_few_states
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
 from d2rpick.histories.digits import (
-    format_above_limit,
+    format_beyond_limit,
     format_window,
     round_down_as_read,
     round_to_first_as_read,
@@ -557,7 +557,7 @@ def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
     """Return the objection that the error of a candidate exceeds the tolerance."""
     limit = limits[candidate]
     return [
-        f"error {format_above_limit(error[candidate], limit)} above the tolerance {limit:g}"
+        f"error {format_beyond_limit(error[candidate], limit)} above the tolerance {limit:g}"
     ]
 
 
@@ -606,7 +606,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
-        times = format_above_limit(means.ratio(energy), MOST_KEPT)
+        times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference"
         yield f"{text}, more than {MOST_KEPT:g} times"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -13,13 +12,15 @@ from d2rpick.histories.samples import find_crossings, merge_times, narrow_bracke
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
+    # Test of times: returns True for each that keeps it.
+    Keeps = Callable[[Samples], NDArray[np.bool_]]
 
 # Number of bisections of the sampling interval at the end of a window: the end is exact to a millionth of it.
 _END_HALVINGS: Final = 20
@@ -55,14 +56,7 @@ def find_acceptable_windows(
         First and last time of each window, ascending [time].
     """
     grid = make_monotone_grid(situation, candidates)
-    if situation.at_rest:  # any tr before td is right, unless td itself is wrong
-        widest = grid[np.newaxis, [0, -1]]
-    else:
-        widest = _find_windows_below(
-            situation,
-            grid,
-            min(situation.most_error, _compute_residual_left(situation)),
-        )
+    widest = _find_windows(grid, _make_rule(situation))
     judged = judge_times(
         situation,
         np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
@@ -114,8 +108,9 @@ def find_alike_windows(
     return find_common_windows(
         [
             acceptable,
-            _find_windows_below(
-                situation, make_monotone_grid(situation, candidates), level
+            _find_windows(
+                make_monotone_grid(situation, candidates),
+                _make_limit_on_error(situation, level),
             ),
         ]
     )
@@ -194,27 +189,39 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     return merge_times(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
-def _compute_residual_left(situation: Situation) -> float:
-    """Return the lock-in error that --max-residual allows in addition to the kinetic fraction: R^2 = L^2 + K [-]."""
-    limit = situation.settings.max_residual
-    share = situation.kinetic_share
-    if limit is None:
-        return np.inf
-    if share is None or sqrt(share) > limit:
-        return -1.0
-    # the square of a large limit overflows
-    return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))
-
-
-def _find_windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
-    """Return the windows in which the error does not exceed ``level``, shape (n, 2) [time]."""
+def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
+    """Return a test of times: the error does not exceed ``level``, and the energy not the largest of the reference."""
     highest = find_largest_energy(situation)
 
-    def keeps(times: Samples) -> NDArray[np.bool_]:
+    def has_small_error(times: Samples) -> NDArray[np.bool_]:
         return (situation.errors(times) <= level) & (
             situation.vibration.whole.energies(times) <= highest
         )
 
+    return has_small_error
+
+
+def _make_rule(situation: Situation) -> Keeps:
+    """Return a test of times: the error is acceptable, and no limit of the settings is exceeded."""
+    has_small_error = _make_limit_on_error(situation, situation.most_error)
+    has_limits = any(True for _ in situation.settings.limits)
+
+    def keeps_rule(times: Samples) -> NDArray[np.bool_]:
+        # any tr before td is right at rest, unless td itself is wrong
+        keeps = (
+            np.ones(times.shape, np.bool_)
+            if situation.at_rest
+            else has_small_error(times)
+        )
+        if has_limits:
+            keeps &= judge_times(situation, times.tolist()).judged.within_limits
+        return keeps
+
+    return keeps_rule
+
+
+def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
+    """Return the windows in which a test is kept, shape (n, 2) [time]."""
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])

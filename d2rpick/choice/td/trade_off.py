@@ -14,7 +14,12 @@ from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.pair.candidates import judge_candidates
 from d2rpick.choice.pair.grades import GOOD
-from d2rpick.choice.pair.quality import EQUALLY_GOOD, rank_candidates, rank_judged
+from d2rpick.choice.pair.quality import (
+    EQUALLY_GOOD,
+    list_exceeded_limits,
+    rank_candidates,
+    rank_judged,
+)
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, make_look
 from d2rpick.choice.pair.warnings import warn_about_td
 from d2rpick.choice.td.flights import find_longest_flight
@@ -252,7 +257,7 @@ def explore_run(
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_warn_about_window(warned, window, inside, offers)),
+        cautions=tuple(_warn_about_window(warned, window, inside, offers, suggestion)),
         asked=requested,
         recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
@@ -325,6 +330,7 @@ def _warn_about_window(
     window: tuple[float, float],
     inside: tuple[float, float],
     offers: Sequence[Offer],
+    suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
     """Yield the warnings that concern the whole window; each offer has those of its own td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
@@ -338,10 +344,20 @@ def _warn_about_window(
             f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
         )
     if not any(map(_is_comparable, offers)):
-        yield Caution(
-            "no-candidate",
-            "no td in the window has an acceptable tr that saves anything",
-        )
+        nothing = "no td in the window has an acceptable tr that saves anything"
+        yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
+
+
+def _explain_by_limits(suggestion: PairSuggestion) -> str:
+    """Return which limits the nearest candidate exceeds at the td that ``suggest`` chooses; empty for none."""
+    if suggestion.recommended or not suggestion.candidates:
+        return ""
+    nearest = suggestion.candidates[0]
+    exceeded = list_exceeded_limits(suggestion.situation, nearest)
+    if not exceeded:
+        return ""
+    reasons = "; ".join(excess.message for excess in exceeded)
+    return f"; tr = {nearest.tr:.6g} for td = {suggestion.td:.6g}: {reasons}"
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:

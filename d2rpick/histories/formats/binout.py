@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.content import Content
+    from d2rpick.histories.resuming import ResumePoint
     from d2rpick.histories.source import Source
 
 __all__ = ["Binout", "open_legs", "recognises"]
@@ -93,6 +94,10 @@ class Binout(Database):
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts, both sides as one, and of the rigid walls."""
         return read_binout_forces(self._files)
+
+    def find_resume_points(self) -> dict[str, ResumePoint]:
+        """Return for each file where a later read can begin: before the last but one state of both branches."""
+        return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:
         """Return a branch by name; raise FormatError if there is none, or if records of any branch are lost."""

@@ -27,6 +27,7 @@ from d2rpick.histories.formats.blocks import (
     parse_numbers,
     read_head_of_listing,
 )
+from d2rpick.histories.resuming import ResumePoint
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
@@ -177,6 +178,25 @@ class Blocks(Database):
             *self.notes[:-1],
             "the file ends within its last state, after the lines that were needed",
         )
+
+    def find_resume_points(self) -> dict[str, ResumePoint]:
+        """Return where a later read can begin: at the block before the last one.
+
+        The lines of that block tell when the last one is whole.  A last state of which only the needed lines are there,
+        as `admit_rest` takes it, is not whole.
+        """
+        begin, last_used = self.tail, self.tail
+        for run in self:
+            last_used = run.start + (run.repeats - 1) * run.stride
+            if last_used < self.tail:
+                begin = last_used
+            elif run.repeats > 1:
+                begin = last_used - run.stride
+        first = self._find(self._begin)
+        head = self._data[: self.tail if first is None else first]
+        is_half = self.rest is not None and last_used == self.rest.start
+        end = self.tail if is_half else len(self._data)
+        return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
         """Return a piece of the whole lines of the file."""

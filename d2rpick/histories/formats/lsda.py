@@ -25,6 +25,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, make_content
 from d2rpick.histories.formats.blocks import count_repetitions
+from d2rpick.histories.resuming import ResumePoint
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -141,10 +142,10 @@ class Lsda:
         self.stop = self.unfinished = ""
         self._known: dict[tuple[bytes, ...], int] = {}
         self._forms: dict[str, tuple[int, _Form]] = {}
-        begin, self._order, self._head, self._type = _read_lsda_header(
+        self._begin, self._order, self._head, self._type = _read_lsda_header(
             self.data, source
         )
-        self._walk(begin)
+        self._walk(self._begin)
 
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return values at any bytes of the file, in the shape of ``positions``."""
@@ -155,6 +156,38 @@ class Lsda:
     def states(self, branch: str) -> NDArray[np.int64]:
         """Return number, start and layout of each visit to a state of a branch, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
+
+    def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
+        """Return where a later read can begin: at the last but one state of that branch of some whose state is first.
+
+        The head repeats the metadata of all wanted branches, each behind a change to its directory.
+        """
+        head = self.data[: self._begin]
+        for branch, visits in self.metadata.items():
+            for start, layout in visits:
+                values = self.layouts[layout].variables.values()
+                size = max(
+                    variable.offset + variable.count * variable.dtype.itemsize
+                    for variable in values
+                )
+                head += self._make_change(f"/{branch}/metadata")
+                head += self.data[start : start + size]
+        earliest = None
+        for branch in branches:
+            last_states = self.states(branch)[-2:]
+            if len(last_states):
+                number, start, _ = last_states[0].tolist()
+                if earliest is None or start < earliest[0]:
+                    earliest = start, f"/{branch}/d{number:06d}"
+        if earliest is None:
+            return ResumePoint(self.data[: self._begin], self._begin, len(self.data))
+        begin, directory = earliest
+        return ResumePoint(head + self._make_change(directory), begin, len(self.data))
+
+    def _make_change(self, path: str) -> bytes:
+        """Return the record of a change to a directory, given by its absolute path."""
+        text = path.encode()
+        return self._head.pack(self._head.size + len(text), DIRECTORY) + text
 
     def raw(self, start: int, variable: Variable) -> bytes:
         """Return the bytes of a variable in the directory that starts at byte ``start``."""

@@ -30,6 +30,7 @@ from d2rpick.histories.formats.radioss_records import (
     split_integers,
 )
 from d2rpick.histories.names import Part, Selection, clean_text
+from d2rpick.histories.resuming import ResumePoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -202,6 +203,12 @@ class TimeHistory(Database):
         impulses = values.reshape(self._states, len(triples), 3).sum(axis=1)
         name = f"{_TOUCHING[group.kind]} {number}{f' {title!r}' if title else ''}"
         return ContactForce.of_impulses(name, self.time, impulses)
+
+    def find_resume_points(self) -> dict[str, ResumePoint]:
+        """Return where a later read of the file can begin: at its last whole state."""
+        begin = self._records.at + self._stride * max(self._states - 1, 0)
+        head = self._data[: self._records.at]
+        return {self.source: ResumePoint(head, begin, len(self._data))}
 
     def size_until(self, time: float) -> int:
         """Return the bytes of the head and of the states up to a time [time]."""

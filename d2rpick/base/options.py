@@ -1,0 +1,87 @@
+"""Describe an option once: the text of its help, the kind of its value, and what its value limits.
+
+The command line, the arguments of Python and the settings of a choice are made from tables of such options: dataclasses
+whose fields are made by `make_option`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field, fields
+from functools import cache
+from math import inf
+from typing import Any, Final
+
+from d2rpick.base.tuples import NamedTuple
+
+# End of a range of whole numbers without upper limit.
+UNLIMITED: Final = 2**63
+
+
+class Number(NamedTuple):
+    """A finite number from ``low`` (or above it, if ``above``) to ``high``."""
+
+    low: float = -inf
+    high: float = inf
+    above: bool = False
+
+    def missed(self, value: float) -> str:
+        """Return the limit that a value violates as text, empty if the value is allowed."""
+        if value < self.low or (self.above and value == self.low):
+            return f"{'above' if self.above else 'of at least'} {self.low:g}"
+        return f"of at most {self.high:g}" if value > self.high else ""
+
+
+TIME: Final = Number()
+POSITIVE: Final = Number(0.0, above=True)
+NOT_NEGATIVE: Final = Number(0.0)
+FRACTION: Final = Number(0.0, 1.0)
+AT_LEAST_ONE: Final = Number(1.0)
+
+
+class Option(NamedTuple):
+    """An option: the ``kind`` of its value, its help text, and the options that it replaces.
+
+    ``kind`` is a `Number`, a range of whole numbers, a list of names, or a kind of the command line: "flag", "file",
+    "names", ...  ``many``: it can be repeated; ``pair``: two values.
+    """
+
+    help: str
+    kind: Number | range | tuple[str, ...] | str = "text"
+    metavar: str | None = None
+    many: bool = False
+    pair: bool = False
+    instead_of: tuple[str, ...] = ()
+    short: tuple[str, ...] = ()
+
+
+def make_option(
+    text: str,
+    kind: Any = "text",
+    metavar: str | None = None,
+    *,
+    default: Any = None,
+    **keywords: Any,
+) -> Any:
+    """Return a field of a table of options; one that can be repeated is an empty tuple by default.
+
+    What is known of the option besides, the ``metadata`` of the field, may be given as a mapping.
+    """
+    metadata = keywords.pop("metadata", {})
+    default = () if keywords.get("many") else default
+    option = Option(text, kind, metavar, **keywords)
+    return field(default=default, metadata={"option": option, **metadata})
+
+
+@cache
+def list_options(table: Any) -> dict[str, Option]:
+    """Return the options of a table by the names of their fields."""
+    return {
+        field.name: field.metadata["option"]
+        for field in fields(table)
+        if "option" in field.metadata
+    }
+
+
+def make_option_name(name: str) -> str:
+    """Return the name of an option as it is typed."""
+    return name.replace("_", "-")

@@ -1,0 +1,196 @@
+"""Declare each option of a choice once: its type, default, help and range, where it is asked, and what it limits.
+
+The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
+of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
+
+from d2rpick.base.options import (
+    AT_LEAST_ONE,
+    FRACTION,
+    NOT_NEGATIVE,
+    TIME,
+    make_option,
+)
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import GRADES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+class Limit(NamedTuple):
+    """A limit that a recommended pair must keep; a pair whose value is unknown does not keep it.
+
+    ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  ``is_lower``: the value must
+    not lie below the limit, instead of above it.
+    """
+
+    quantity: str
+    is_lower: bool = False
+
+    def is_kept_by(self, values: Any, limit: float) -> Any:
+        """Return True for each of the ``values`` that keeps the limit; NaN stands for an unknown value.
+
+        Examples
+        --------
+        >>> Limit("residual").is_kept_by(0.3, 0.2), Limit("rigid_time", is_lower=True).is_kept_by(0.3, 0.2)
+        (False, True)
+        """
+        return values >= limit if self.is_lower else values <= limit
+
+    def explain(self, value: float | None, limit: float) -> str:
+        """Return the message that a value exceeds the limit, or that it is unknown.
+
+        Examples
+        --------
+        >>> Limit("residual").explain(0.31416, 0.2)
+        'residual 0.314 above the limit 0.2'
+        >>> Limit("rigid_time", is_lower=True).explain(0.012, 0.02)
+        'rigid time 0.012 below the limit 0.02'
+        """
+        # imported here: a start needs no message
+        from d2rpick.histories.digits import format_beyond_limit
+
+        name = self.quantity.replace("_", " ")
+        if value is None:
+            bound = "at least" if self.is_lower else "at most"
+            return f"{name} unknown, {bound} {limit:g} was asked for"
+        side = "below" if self.is_lower else "above"
+        return f"{name} {format_beyond_limit(value, limit)} {side} the limit {limit:g}"
+
+
+class Use(NamedTuple):
+    """How an option of a choice is used.
+
+    ``limit``: what its value limits, None if it is no limit.  ``of_cards``: ``card`` and ``check --history`` take it
+    too.  ``of_sets``: ``parts`` and ``study`` take it too.  ``is_advanced``: it stands in the last section of the help.
+    """
+
+    limit: Limit | None = None
+    of_cards: bool = False
+    of_sets: bool = True
+    is_advanced: bool = False
+
+
+def _describe_use(**use: Any) -> dict[str, Use]:
+    """Return the metadata of a field that say how an option is used."""
+    return {"use": Use(**use)}
+
+
+# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
+# start.
+@dataclass(init=False, eq=False, repr=False, kw_only=True)
+class ChoiceOptions:
+    """How to choose and judge a pair; times have the unit of the history.
+
+    An option that is a limit of a recommendation has a ``limit`` of a quantity: suggest, verify, explore, plan, study
+    and check then refuse a pair that exceeds it, say so, and leave it out of the windows.
+    """
+
+    after: float | None = make_option(
+        "End of the load.  [default: found from the record]",
+        TIME,
+        "T",
+        metadata=_describe_use(of_cards=True),
+    )
+    landing: float | None = make_option(
+        "Time of the next contact after the flight; td is earlier by the margin.  [default: found from the record]",
+        TIME,
+        "T",
+        metadata=_describe_use(of_cards=True),
+    )
+    margin: float | None = make_option(
+        "Time kept free after the load and before the next contact.  [default: 0; derived if d2rpick chooses "
+        "td, or with `landing`]",
+        NOT_NEGATIVE,
+        "T",
+        metadata=_describe_use(of_cards=True),
+    )
+    tolerance: float = make_option(
+        "Largest lock-in error, or level error if no oscillator describes the record.",
+        FRACTION,
+        "L",
+        default=0.2,
+        metadata=_describe_use(of_cards=True),
+    )
+    max_kinetic_share: float | None = make_option(
+        "Reject a td with a larger kinetic share.",
+        NOT_NEGATIVE,
+        "K",
+        metadata=_describe_use(limit=Limit("kinetic_share"), of_cards=True),
+    )
+    max_residual: float | None = make_option(
+        "Reject a pair with a larger residual.",
+        NOT_NEGATIVE,
+        "R",
+        metadata=_describe_use(limit=Limit("residual"), of_cards=True),
+    )
+    fit_window: tuple[float, float] | None = make_option(
+        "Window of time in which the oscillator is identified.",
+        TIME,
+        "LO HI",
+        pair=True,
+        instead_of=("stiffness", "no_verify"),
+        metadata=_describe_use(is_advanced=True),
+    )
+    strict: bool = make_option(
+        "Recommend nothing if only the energy shows when the load ends.",
+        "flag",
+        default=False,
+        metadata=_describe_use(),
+    )
+    keep_vibration: bool = make_option(
+        "Grade the vibration by its own error, also if that is small in the next contact.",
+        "flag",
+        default=False,
+        metadata=_describe_use(),
+    )
+    min_quality: str | None = make_option(
+        "Lowest grade that is not reported as a problem (exit code 1).  [default: fair; poor if only `td` is given]",
+        GRADES,
+        metadata=_describe_use(of_cards=True, of_sets=False),
+    )
+    cost_share: float | None = make_option(
+        "Share of the cost of a time step that the elements of the switched parts take, to predict the run time.",
+        FRACTION,
+        "C",
+        metadata=_describe_use(of_sets=False, is_advanced=True),
+    )
+    # elements that are rigid no longer limit the time step, so it cannot become smaller
+    step_ratio: float | None = make_option(
+        "Ratio of the time step while rigid to the one before, 1 or more.  [default: 1]",
+        AT_LEAST_ONE,
+        "N",
+        metadata=_describe_use(of_sets=False, is_advanced=True),
+    )
+
+    @property
+    def limits(self) -> Iterator[tuple[Limit, float]]:
+        """The limits of a recommendation that are set, with their values."""
+        for name, use in list_uses().items():
+            value = getattr(self, name)
+            if use.limit is not None and value is not None:
+                yield use.limit, value
+
+
+@cache
+def list_uses() -> dict[str, Use]:
+    """Return how each option of a choice is used, by the names of the options."""
+    return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}
+
+
+# Options of a choice: all, those for sets of parts and many runs, those for cards and decks, and those that few need.
+CHOOSING: Final = tuple(list_uses())
+CHOOSING_FOR_SETS: Final = tuple(
+    name for name, use in list_uses().items() if use.of_sets
+)
+CHOOSING_FOR_CARDS: Final = tuple(
+    name for name, use in list_uses().items() if use.of_cards
+)
+ADVANCED: Final = tuple(name for name, use in list_uses().items() if use.is_advanced)

@@ -1,0 +1,23 @@
+"""Reading on in files that grow: a later read takes the head of a file and its last states, not all states again."""
+
+from __future__ import annotations
+
+from d2rpick.base.tuples import NamedTuple
+
+
+class ResumePoint(NamedTuple):
+    """Where a later read of a file that has grown can begin.
+
+    ``head`` followed by the bytes of the file from ``begin`` on is a file of the same format with the last states only.
+    ``end`` is the address after the last whole state: what was read behind it lacks some lines of a state.
+    """
+
+    head: bytes
+    begin: int
+    end: int
+
+    def read_on(self, name: str) -> bytes:
+        """Return the head and the bytes of a file from ``begin`` on; OSError if it cannot be read."""
+        with open(name, "rb") as stream:  # noqa: PTH123  start-up
+            stream.seek(self.begin)
+            return self.head + stream.read()
