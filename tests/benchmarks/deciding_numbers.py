@@ -14,8 +14,10 @@ import multiprocessing
 import pkgutil
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -257,6 +259,15 @@ def _list_functions(module: ModuleType) -> Iterator[FunctionType]:
                     yield member
 
 
+def order_by_kind(names: Sequence[str], baselines: Mapping[str, Baseline]) -> list[str]:
+    """Order questions so that one of each kind comes first, the quickest, then the next of each kind."""
+    by_kind: dict[str, list[str]] = defaultdict(list)
+    for name in sorted(names, key=lambda name: baselines[name].seconds):
+        by_kind[name.split()[0]].append(name)
+    rounds = zip_longest(*by_kind.values())
+    return [name for round_names in rounds for name in round_names if name]
+
+
 def try_factor(
     modules: Sequence[ModuleType],
     constant: Constant,
@@ -265,10 +276,10 @@ def try_factor(
     baselines: Mapping[str, Baseline],
     seconds: float,
 ) -> Outcome:
-    """Ask the questions that run through the users of a constant, the quickest first, with the constant scaled."""
+    """Ask the questions that run through the users of a constant, with the constant scaled, until it surely decides."""
     users = find_users(modules, constant)
     touched = [name for name in questions if users & baselines[name].places]
-    touched.sort(key=lambda name: baselines[name].seconds)
+    touched = order_by_kind(touched, baselines)
     patch_constant(modules, constant, factor)
     asked_count = changed = 0
     start = time.process_time()

@@ -84,7 +84,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """Error by which candidates are ranked [-]: the residual, on basis "energy" the level error; infinity if unknown."""
+        """Error by which candidates are ranked [-]: the residual, or the level error; infinite if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
