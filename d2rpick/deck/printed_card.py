@@ -97,7 +97,7 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: ``text`` is all of it, ``files`` is the same by the file names that the solver expects.
+    """Solver input: ``text`` is all of it, and ``files`` has the same text by the file names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.

@@ -33,7 +33,7 @@ def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     >>> [choose_history_format(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
     ['csv', 'glstat', 'hdf5', 'csv']
     """
-    from pathlib import PurePath  # not above: start-up
+    from pathlib import PurePath  # imported here to start faster
 
     if name is None:
         return "csv"

@@ -381,13 +381,13 @@ def _read_case(
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
-        from d2rpick.deck.radioss_run import read_run  # not above: start-up
+        from d2rpick.deck.radioss_run import read_run  # imported here to start faster
 
         run = read_run(path, content)
         return RunCase(run.deck, judge, run=run)
     deck = read_deck(path, source)
     if restarts:
-        from d2rpick.deck.restarts import join_restarts  # not above: start-up
+        from d2rpick.deck.restarts import join_restarts  # imported here to start faster
 
         deck = join_restarts(deck, restarts)
     return Case(deck, judge)

@@ -444,7 +444,9 @@ def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
     """Return what no leg switches, and which of its parts deform; None for the parts if no history shows it."""
-    from d2rpick.deck.radioss_run import find_left_rigid  # not above: start-up
+    from d2rpick.deck.radioss_run import (
+        find_left_rigid,
+    )  # imported here to start faster
 
     left_bodies = find_left_rigid(case.run, case.windows.windows)
     return left_bodies, case.judge.deforming(

@@ -242,7 +242,7 @@ def _check_ids_exist(case: Case) -> Iterator[Objection]:
 
 def _list_nearest(number: int, parts: DeckParts) -> str:
     """Return the nearest part ids of the deck with their titles, as text in brackets."""
-    from heapq import nsmallest  # not above: start-up
+    from heapq import nsmallest  # imported here to start faster
 
     near = sorted(
         nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))

@@ -1,4 +1,4 @@
-"""Read the files of a run again and again while it is computed, and give the new states.
+"""Read the files of a run repeatedly while it is computed, and return the new states.
 
 Of the histories of solvers only the last states are read again.  Files of other formats are read as a whole each time.
 """
@@ -25,41 +25,42 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-# A record with fewer states is read as a whole: what follows from all states, as which parts are springs, may change.
+# A record with fewer states is read completely, since results from all states may change, such as which parts are
+# springs.
 _FEWEST_STATES: Final = 200
 
 
 class _ReadFile(NamedTuple):
-    """A file that was read: where the next look begins, and the number of the file in its file system."""
+    """A file that was read: where the next read begins, and its number in the file system."""
 
     point: ResumePoint
     inode: int
 
     def shift(self, point: ResumePoint) -> ResumePoint:
-        """Return a point in the file, from its address behind the head of this one."""
+        """Return a position in the file from its offset behind the header of this one."""
         skipped = self.point.begin - len(self.point.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
 
 
 class Looks:
-    """Reads the same run again and again, with the same ``selection`` and deck."""
+    """Reads the same run repeatedly, with the same ``selection`` and deck."""
 
     def __init__(
         self, selection: Selection, inventory: Inventory | None = None
     ) -> None:
         self._selection, self._inventory = selection, inventory
         self._last_states: list[Table] = []
-        # Files in which the next look reads on, and all files of the last look.
+        # Positions at which the next read continues, and all files of the last read.
         self._read_files: dict[str, _ReadFile] = {}
         self._names: frozenset[str] = frozenset()
 
     @property
     def grow(self) -> bool:
-        """Return True if the next look reads the last states only."""
+        """Return True if the next read covers the last states only."""
         return bool(self._read_files)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Read the new states, and whether they follow the states that were read before.
+        """Read the new states, and report whether they follow those read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -97,7 +98,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, those that were known among them, and the whole of new files.
+        """Read the last states of each file, including the known ones, and all of new files.
 
         Return None if a file was written anew, or if one of the files cannot be read from its middle.
         """
@@ -106,7 +107,7 @@ class Looks:
             return None
         try:
             history, points = self._open(sources)
-        except (FormatError, HistoryError):  # a file was written anew
+        except (FormatError, HistoryError):  # a file was rewritten
             return None
         for name, read_file in self._read_files.items():
             if name in points:
@@ -115,7 +116,7 @@ class Looks:
         return history
 
     def _list_last_pieces(self, names: Sequence[str]) -> list[Source]:
-        """Return the head and the last states of each file; [] if a file was written anew."""
+        """Return the header and the last states of each file; [] if a file was rewritten."""
         if not self._read_files:
             return []
         sources = []
@@ -134,7 +135,7 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in some files, without a last state that is not whole, and where to read on in them.
+        """Return the history in the files without an incomplete last state, and where to continue in them.
 
         The places are {} if the format of a file is always read as a whole.
         """
@@ -148,7 +149,7 @@ class Looks:
         return Reference.of(run, self._selection).history, points
 
     def _note_read(self, points: Mapping[str, ResumePoint]) -> None:
-        """Note where the next look reads on; files without a point, as those with forces only, are not read again."""
+        """Store where the next read continues; files without such a position, with forces only, are not read again."""
         self._read_files = {
             name: _ReadFile(point, Path(name).stat().st_ino)
             for name, point in points.items()
@@ -156,7 +157,7 @@ class Looks:
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
-    """Return where to read on in the files of a run; {} if the format of one is always read as a whole."""
+    """Return where to continue in the files of a run; {} if one format is always read completely."""
     points: dict[str, ResumePoint] = {}
     for database in run.databases:
         points_of_format = database.find_resume_points()
@@ -167,7 +168,7 @@ def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
 
 
 def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:
-    """Return a file without a last state that lacks some of its lines."""
+    """Return a file without an incomplete last state."""
     point = points.get(source.name)
     if point is None or point.end == len(source.data):
         return source

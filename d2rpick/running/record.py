@@ -1,4 +1,4 @@
-"""The record of a run that is being computed: every look appends states to it."""
+"""Keep the record of a run that is being computed, to which each read appends states."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Rows for which a column has room from the start.
+# Initial number of rows of a column.
 _FEWEST_ROWS: Final = 64
-# Tolerance of values that are read twice, as a share of the largest one.  A sum over parts may end in other digits, and
-# the energy of springs is left out of an energy only if they have any in the states that are read together.
+# Tolerance of values that are read twice, as a share of the largest value.
+# Sums over parts may differ in the last digits, and the spring energy is left out only if it exists in the states read.
 _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array that grows by rows and is copied only when its room doubles."""
+    """An array that grows by rows and is copied only when its capacity doubles."""
 
     def __init__(self) -> None:
         self._room: NDArray[Any] = np.empty(0)
@@ -51,7 +51,7 @@ class GrowingColumn:
 
 
 class GrowingRecord:
-    """All states of a run so far, as columns of three kinds of tables: the history, its momenta and its balance."""
+    """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 
     def __init__(self) -> None:
         self._latest_tables: list[Table] = []
@@ -80,7 +80,7 @@ class GrowingRecord:
 
     @property
     def history(self) -> History:
-        """All states as one history; there must be some."""
+        """All states as one history; at least one state must exist."""
         if self._history is None:
             tables: list[Any] = []
             for table, columns in zip(self._latest_tables, self._columns, strict=True):
@@ -116,7 +116,7 @@ def _join_tables(tables: Sequence[Any]) -> History:
 
 
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; where it has none, that of the tables ``before``."""
+    """Return the last state of each table of a history; for an empty table that of the tables ``before``."""
     tables = list_tables(history)
     last_states: list[Any] = []
     for number, table in enumerate(tables):
@@ -130,7 +130,7 @@ def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
 
 
 def skip_states(history: History, last_states: Sequence[Table]) -> History | None:
-    """Return the states of a history after the last ones that were known; None if it does not hold these.
+    """Return the states of a history after the known last ones; None if it does not contain these.
 
     ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
     """
@@ -149,7 +149,7 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
 
 def _count_known_states(table: Table, last_state: Table) -> int | None:
-    """Return the states of a table up to the last one that was known; None if that is not in it."""
+    """Return the number of states up to the last known one; None if that is not in the table."""
     if not last_state.time.size:
         return 0
     count = int(np.searchsorted(table.time, last_state.time[0], side="right"))

@@ -209,7 +209,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves; the selection gives the time column and the required values of a last line."""
+    """Open text files as tables or curves; the selection gives the time column and the columns of a last line."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
