@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
+MOST_REPLAYED = 10_000_000  # a longer text would have some gigabytes
 HISTORIES = (
     "csv",
     "hdf5",

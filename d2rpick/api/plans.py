@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times
 
-_STEPS: Final = 200  # number of td that are explored
+_STEPS: Final = 200  # number of td to explore
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -303,7 +303,7 @@ def plan_run(
     if done:
         from d2rpick.deck.printed_card import (
             check_windows,
-        )  # imported here since a plan alone needs no decks
+        )  # imported here: a plan alone needs no decks
 
         windows = check_windows(done)
     earlier = (
@@ -319,7 +319,7 @@ def plan_run(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # as on its standard input, a line for each
+    )  # as on its standard input, one line for each
     times += [
         text
         for name in (before.sources if before else ())

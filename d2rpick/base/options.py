@@ -1,4 +1,4 @@
-"""Describe an option once: the text of its help, the kind of its value, and what its value limits.
+"""Describe an option once: its help text, the kind of its value, and the limits of its value.
 
 The command line, the arguments of Python and the settings of a choice are made from tables of such options: dataclasses
 whose fields are made by `make_option`.
@@ -25,7 +25,7 @@ class Number(NamedTuple):
     above: bool = False
 
     def missed(self, value: float) -> str:
-        """Return the limit that a value violates as text, empty if the value is allowed."""
+        """Return the limit that a value violates as text; empty if the value is allowed."""
         if value < self.low or (self.above and value == self.low):
             return f"{'above' if self.above else 'of at least'} {self.low:g}"
         return f"of at most {self.high:g}" if value > self.high else ""

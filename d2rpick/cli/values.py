@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # generic since click 8.4
+    FloatType = click.ParamType  # generic from click 8.4 on
 
 CARDS: Final = tuple(list_options(Cards))
-# Options that apply only together with one of others: settings are for all commands, even those that lack these.
+# Options that apply only together with another one: settings are for all commands, also those that lack these.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -168,7 +168,7 @@ class ChannelNames(Names):
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
-    """Open the files on the command line; return None if they are no run."""
+    """Open the files on the command line; None if they are not a run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -342,7 +342,7 @@ def _read_value(
         raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
         return converted
-    from pathlib import Path  # imported here since settings rarely contain a file
+    from pathlib import Path  # imported here: settings rarely contain a file
 
     folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
     if has_list:

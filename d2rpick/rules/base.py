@@ -211,7 +211,7 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """Return the nodal rigid bodies, extra nodes and joints, which may lie in a switched part."""
+        """Return the nodal rigid bodies, extra nodes and joints, which may belong to a switched part."""
         return [
             *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
         ]
@@ -227,7 +227,7 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Return True if all parts are known; a file that contains only switching cards belongs to another deck."""
+        """Return True if all parts are known; a file with only switching cards belongs to another deck."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property
@@ -263,7 +263,7 @@ class Case:
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the cards that no time switches, each with what switches it."""
+        """Return the cards that do not switch by time, each with its trigger."""
         return ()
 
     @cached_property
@@ -297,7 +297,7 @@ class Case:
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
         ]
-        # ENDTIM and DT have the same place.
+        # ENDTIM and DT have the same columns.
         return tuple((card, card.real(card.rows[0], DATABASE["DT"])) for card in cards)
 
 
@@ -442,7 +442,7 @@ class RunCase(Case):
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """Return what the starter does wrongly to the nodes of the bodies that the legs switch."""
+        """Return the harmful effects of the starter on the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
         from d2rpick.deck.radioss_flaws import find_flaws  # loads numpy

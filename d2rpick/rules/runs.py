@@ -1,4 +1,4 @@
-"""Rules D2R307, D2R401-409 and D2R411-412: engine files and rigid bodies of a Radioss run."""
+"""Define rules D2R307, D2R401-409 and D2R411-412: engine files and rigid bodies of a Radioss run."""
 
 from __future__ import annotations
 
@@ -443,7 +443,7 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return what no leg switches, and which of its parts deform; None for the parts if no history shows it."""
+    """Return the bodies that no leg switches, and their deforming parts; None for parts without history."""
     from d2rpick.deck.radioss_run import (
         find_left_rigid,
     )  # imported here to start faster

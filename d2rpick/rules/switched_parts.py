@@ -1,4 +1,4 @@
-"""Rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and what is attached to them."""
+"""Define rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and their attachments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import CardField
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # ids of the deck that a message lists next to an unknown id
+_NEAREST = 3  # most ids of the deck that a message lists next to an unknown id
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -255,7 +255,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield what a line of a card names but the deck does not define, as kind (part set, part or lead part) and id."""
+    """Yield kind (part set, part or lead part) and id of what a line names but the deck does not define."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)

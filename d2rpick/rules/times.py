@@ -1,4 +1,4 @@
-"""Rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the window times, also compared with an
+"""Define rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the times of windows."""
 energy history.
 """
 
@@ -46,7 +46,7 @@ _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # With so few cards D2R102 and D2R105 report the same mistake.
+_FEW = 2  # With at most this number of cards D2R102 and D2R105 report the same mistake.
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
