@@ -85,9 +85,9 @@ class Grid(NamedTuple):
         width = ceil(sqrt(count))
         inner = np.arange(width) * self.step
         outer = np.arange(0, count, width) * self.step
-        products = np.exp(np.multiply.outer(outer, poles))[:, np.newaxis] * np.exp(
-            np.multiply.outer(inner, poles)
-        )
+        coarse: Complex = np.exp(np.multiply.outer(outer, poles))
+        fine: Complex = np.exp(np.multiply.outer(inner, poles))
+        products: Complex = coarse[:, np.newaxis] * fine
         return products.reshape(-1, poles.size)[:count]
 
     def gain(self, poles: Complex) -> Complex:
