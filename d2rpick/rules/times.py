@@ -1,6 +1,4 @@
 """Define rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the times of windows."""
-energy history.
-"""
 
 from __future__ import annotations
 
