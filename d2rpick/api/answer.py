@@ -138,7 +138,7 @@ class RunAnswer(Paged):
 
     question: RunQuestion = field(repr=False)
     times: tuple[str, ...]
-    name: ClassVar[str]  # name of the command
+    name: ClassVar[str]  # name of the command that asks the question
 
     @property
     def run(self) -> Run:

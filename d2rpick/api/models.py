@@ -134,7 +134,9 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        assert oscillator is not None  # the options that define it are required
+        assert (
+            oscillator is not None
+        )  # click requires the options that define an oscillator
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:

@@ -319,7 +319,7 @@ def plan_run(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # as on its standard input, one line for each
+    )  # windows as `check` reads them on standard input, one line each
     times += [
         text
         for name in (before.sources if before else ())
@@ -340,7 +340,7 @@ def write_deck(
     from d2rpick.rules.judgement import HistoryJudge
 
     question = plan.question
-    done = card.card.windows[: len(plan.done)]  # the times as printed
+    done = card.card.windows[: len(plan.done)]  # windows with the times as printed
     names = write_deck(
         question.request.deck or "", card.card, folder, overwrite=overwrite
     )

@@ -221,7 +221,7 @@ class Request(ChoiceOptions, ReadingOptions):
             )  # imported here: it is rarely given
 
             mode = to_mode(oscillator, self.v0)
-        # the settings have their own defaults for open questions
+        # options without a value keep the defaults of the settings
         chosen = {
             name: getattr(self, name)
             for name in options.CHOOSING

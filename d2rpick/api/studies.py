@@ -364,7 +364,7 @@ class Ledger:
             FAILED,
             UNREADABLE,
             INTERNAL_ERROR,
-        ):  # computed again next time
+        ):  # such a row is computed again next time
             return
         try:
             append_as_a_whole(

@@ -28,7 +28,7 @@ _BOUNDS: Final = {
         "times as many bytes",
     ),  # a history unpacks to 3 to 30 times its size
     "UNPACKED": (4e9, "bytes"),  # unpacked data are kept in memory
-    "LINE": (1e6, "bytes"),  # some 50,000 columns
+    "LINE": (1e6, "bytes"),  # bytes of some 50,000 columns
     "DEPTH": (100.0, "groups"),
 }
 # Unpacked size from which the ratio is checked: constant columns shrink by a factor of 1000, and less is unpacked fast.

@@ -187,7 +187,9 @@ def _begin_work(held: Connection) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
-        held.poll(None)  # nothing is ever sent
+        held.poll(
+            None
+        )  # waits until the other end is closed, since nothing is ever sent
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
@@ -207,7 +209,10 @@ def start_importing(processes: int, module: str) -> None:
 
 def _start_server(module: str) -> None:
     """Start the process from which others are forked; an interrupt ends it without a message even while it imports."""
-    from multiprocessing import forkserver, resource_tracker  # not on every system
+    from multiprocessing import (
+        forkserver,
+        resource_tracker,
+    )  # Windows has no fork server
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
     resource_tracker.ensure_running()  # starting it would unblock SIGINT

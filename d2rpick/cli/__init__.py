@@ -148,7 +148,9 @@ class _CommandGroup(Documented, click.Group):
         if not args and not ctx.resilient_parsing:
             click.echo(ctx.get_help(), err=True)
             ctx.exit(COULD_NOT_RUN)
-        ctx.meta["d2rpick.command"] = tuple(args)  # click consumes the list
+        ctx.meta["d2rpick.command"] = tuple(
+            args
+        )  # a copy, because click empties the list of arguments
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -154,7 +154,7 @@ def suggest(
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
     answer = suggest_for_question(question, wanted)
-    # a given td is answered, however poor it is
+    # a given td is answered even if it is poor
     min_grade = request.min_quality or ("poor" if td is not None else "fair")
     passed = answer.decision is not None and answer.decision.reaches(min_grade)
     new_cautions = [

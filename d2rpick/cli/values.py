@@ -356,7 +356,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
         reason = "programs, output files and overwrite are never taken from a file"
     elif (
         not option.expose_value
-    ):  # --help, --debug and others that concern a single call
+    ):  # options that concern a single call, such as --help and --debug
         reason = "this is never taken from a file"
     else:
         return

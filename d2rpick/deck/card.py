@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import Block
 
 
-STANDARD, LONG = 10, 20  # columns of a field
+STANDARD, LONG = 10, 20  # width of a field in standard and in long format [characters]
 # Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled on use.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled at first use
 _PARAMETERS: Final = [*PARAMETERS]
 _FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
@@ -51,7 +51,7 @@ class CardField(NamedTuple):
 
     text: str
     block: Block
-    distance: int  # lines below the keyword
+    distance: int  # number of lines below the keyword
     column: int
 
     @property

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
-WIDTH = 10  # columns of a field
+WIDTH = 10  # width of a field [characters]
 LONGEST = WIDTH - 1  # characters of a number: a blank separates it from the next field
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17

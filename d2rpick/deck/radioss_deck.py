@@ -51,7 +51,7 @@ WITHOUT_FRAME: Final = {
     "SHEL16",
 }
 _RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe
+_ICOROTATIONAL: Final = 2  # value of Iframe for a co-rotational frame
 # Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
 _NOT_TURNED: Final = {
     1,
@@ -158,9 +158,9 @@ class RadiossLeg:
     cap: Value[float] | None = None
     version: str = ""
     starts: list[InitialVelocity] = field(default_factory=list)
-    # Sensors that are reset at its start.
+    # Sensors that are reset at the start of the leg.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # sensor that ends it, at an unknown time
+    sensor: int = 0  # sensor that ends the leg at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
@@ -436,7 +436,7 @@ class Starter:
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
-        # Flags of each property; their line may be blank.
+        # Flags of each property; the line of the flags may be blank.
         flags = {
             get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    Group = tuple[str, tuple[int, ...]]  # kind of its members, and their ids
+    Group = tuple[str, tuple[int, ...]]  # kind and ids of the members of a node group
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4

@@ -398,7 +398,7 @@ def find_rigid_parts(
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
     if incomplete:
-        from d2rpick.deck.mesh import find_parts_within  # loads numpy
+        from d2rpick.deck.mesh import find_parts_within  # imported here: it loads numpy
 
         for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts

@@ -74,11 +74,11 @@ _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
 )
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled on use
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled at first use
 # Keywords that seem to be switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # levels of nested includes
+_DEEPEST = 60  # largest number of nested includes
 _MOST_FILES = 10_000
 _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
@@ -194,7 +194,7 @@ def _read_transform(
 
 def _get_folder(file: str) -> Path:
     """Return the folder of a file."""
-    from pathlib import Path  # not above: only decks with includes need it
+    from pathlib import Path  # imported here: only decks with includes need it
 
     return Path(file).parent
 
@@ -281,7 +281,7 @@ class Deck:
         return cards_by_file
 
 
-@lru_cache(1024)  # decks use the same keywords repeatedly
+@lru_cache(1024)  # cached, because decks use the same keywords repeatedly
 def _list_stems(name: str) -> tuple[str, ...]:
     """Return a name and each beginning of it before an ``_``."""
     return tuple(

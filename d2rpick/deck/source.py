@@ -39,7 +39,7 @@ _FIRST: Final = 1 << 16  # bytes that are searched for the first line end
 _HEAD: Final = 1024  # bytes of a keyword line that are read
 _BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
 _SILENCE: Final = (
-    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled on use
+    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled at first use
 )
 
 
@@ -208,7 +208,7 @@ class SourceFile:
         elif isinstance(content, bytes):
             content = HeldInMemory(content)
         self._file = content
-        # Offsets and the line numbers at them, ascending.
+        # Ascending offsets at which the line number is known, with that number.
         self._counted = [(0, 1)]
         self._longest = bound("LINE")
 
@@ -314,7 +314,7 @@ class Block:
     source: SourceFile
     start: int
     end: int | None
-    head: str  # the keyword line
+    head: str  # text of the keyword line
 
     @property
     def encrypted(self) -> bool:
@@ -337,7 +337,7 @@ class Block:
         *lines, last = self.source.text(self.start, self.end).split("\n")
         if (
             last and self.end is None
-        ):  # otherwise these are the blanks before the next keyword
+        ):  # otherwise the piece contains the blanks before the next keyword
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)
         return [

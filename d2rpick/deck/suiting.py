@@ -89,7 +89,9 @@ def _is_on_parts(
     """Return True if there are constraints and each belongs to these parts alone, so that all may be deleted."""
     if not constraints:
         return False
-    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_first_parts,
+    )  # imported here: it loads numpy
 
     cards = find_element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)

@@ -157,7 +157,7 @@ def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
     """Yield cards that resemble switching cards but are none, with the probably intended keyword."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
-            from difflib import get_close_matches  # start-up
+            from difflib import get_close_matches  # imported here to start faster
 
             name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"

@@ -90,7 +90,7 @@ def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
     from d2rpick.deck.radioss_deck import (
         get_number,
-    )  # not above: only Radioss decks need it
+    )  # imported here: only Radioss decks need it
 
     flowing = {
         get_number(card, 2): card.words[0]

@@ -253,7 +253,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
             node
             for node in find_bodies_kept_off(run.legs)
             if node not in switched_nodes
-        ]  # otherwise they would be rigid from time 0
+        ]  # without these lines the bodies would be rigid from time 0
         # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
         lines = (
             write_numbers(off_nodes)
@@ -474,7 +474,7 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import find_bodies  # not above: loads numpy
+    from d2rpick.deck.radioss_bodies import find_bodies  # imported here: it loads numpy
 
     run = read_run(path)
     if run.starter is None or not run.legs:

@@ -332,7 +332,9 @@ class Laws:
     @cached_property
     def fall(self) -> bool:
         """Return True if gravity moves the parts at some time; otherwise something supports them."""
-        self.fall = False  # `fall` is used while it is computed
+        self.fall = (
+            False  # preliminary value, because `fall` is used while it is computed
+        )
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in list_moments(self.fit.time))

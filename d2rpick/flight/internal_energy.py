@@ -202,7 +202,7 @@ def _find_change_of_level(history: History, start: float, td: float) -> float | 
     means = (sums[width:] - sums[:-width]) / width
     first_after = (
         inside.stop - inside.start
-    )  # the first mean with all its states after td
+    )  # index of the first mean with all its states after td
     low, high = _widen_band(means[: first_after - width + 1], 1.0)
     outside = np.flatnonzero((means[first_after:] < low) | (means[first_after:] > high))
     if outside.size:

@@ -42,8 +42,7 @@ _VISIBLE = 100
 # A part with a large momentum of its own, such as a sled, loosens the tolerance for the other parts.
 _LONGER = 1.1
 # Attached parts are searched in this share of the record before td, on at most this many states.
-# The momenta of a body deviate together from a straight line by less than this share, due to rounding and solver
-# errors.
+# The momenta of a body deviate together from a line by less than the third value: rounding and solver errors.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # A sum that decreases by less than this share decreases by rounding.
 # Without this limit a part of almost no mass would be added and removed for ever.
@@ -208,7 +207,7 @@ def find_flight_of(
     ):
         steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
-            return None  # held, or at rest
+            return None  # the parts are held or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return limit_to_unheld(momenta.surroundings, flight, parts, td)

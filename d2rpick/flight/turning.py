@@ -175,7 +175,7 @@ def follow_turning(
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # according to the deck
+    )  # positions of the parts according to the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     return Turning(time, column, arm, moving_inertia, *solved, doubt)
 

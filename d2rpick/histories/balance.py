@@ -52,7 +52,7 @@ _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
 # Normalised names of the spring energy: in Radioss, and in LS-DYNA's glstat and the glstat branch of a binout.
-# In tables these names may mean anything.
+# In tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
 # Springs below this share of the peak internal energy have no energy: single precision and glstat have six digits.
 _NONE: Final = 1e-6

@@ -115,7 +115,7 @@ class OnDisk(Content):
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
         self._lock = Lock()
-        self._own = local()  # buffer and window of each thread
+        self._own = local()  # each thread has its own buffer and window
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 

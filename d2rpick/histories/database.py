@@ -161,7 +161,7 @@ class Legs:
         notes: Sequence[str] = (),
     ) -> None:
         self._cut = cut  # files with truncated packed data
-        self._own_notes = notes  # notes on other files
+        self._own_notes = notes  # notes on files that are not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
         if len(legs) > 1:  # the times of a single leg may be unknown yet
@@ -391,7 +391,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    if max(longest) <= _LONG * min(shortest):  # usually
+    if max(longest) <= _LONG * min(shortest):  # the usual case: regular output
         return ()
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])

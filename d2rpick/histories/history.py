@@ -224,7 +224,7 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Hourglass energy (n,), also if the internal energy contains it; None if unknown."""
+        """Hourglass energy (n,), even if it is part of the internal energy; None if unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
@@ -401,7 +401,9 @@ class History:
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
-        if times[-1] * 1e3 > self.time[-1]:  # usually
+        if (
+            times[-1] * 1e3 > self.time[-1]
+        ):  # the usual case: only times below 1/1000 of the record are checked further
             return
         from d2rpick.histories.digits import ask_for_larger_unit
 

@@ -60,7 +60,7 @@ _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
-_LONGEST_PHRASE: Final = 5  # words
+_LONGEST_PHRASE: Final = 5  # largest number of words in a name of a quantity
 
 # Words that give an internal energy another meaning; KE in capitals only, since "make" contains it too.
 _OTHER_QUANTITY: Final = (
@@ -97,7 +97,7 @@ def _list_phrases() -> Iterator[tuple[str, str]]:
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
 def find_meaning(name: str) -> Meaning | None:
     """Return the quantity that a name means, with its rank; None if there is none, or several.
 
@@ -205,7 +205,9 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        is_other = re.search(_OTHER_QUANTITY, name)  # "dissipated internal energy"
+        is_other = re.search(
+            _OTHER_QUANTITY, name
+        )  # such as "dissipated internal energy"
         if meaning.rank == EXACT:
             exact.append(index)
         elif meaning.rank == WHOLE_MODEL or not is_other:

@@ -41,8 +41,7 @@ INTERNAL_ENERGY: Final = frozenset(
 )  # fmt: skip
 
 # Names of other quantities of the whole model: energies, momentum, velocity and mass of the moving parts.
-# They come from LS-DYNA's glstat and binout, Radioss and its th_to_csv, Abaqus, Exodus and lasso-python,
-# from frames of d2rpick, and from other languages.
+# They come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
 # The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
@@ -132,7 +131,7 @@ def _drop_unit(brackets: re.Match[str]) -> str:
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
 def normalise_name(name: str) -> str:
     """Reduce a name to its letters and digits, in lower case and without its unit.
 

@@ -176,7 +176,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            return None  # it cannot show which parts fly together
+            return None  # this database cannot show which parts fly together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
         return Momenta(
@@ -295,7 +295,9 @@ class OpenedRun:
                 continue
             for quantity in QUANTITIES:
                 if quantity in database.quantities and quantity not in columns:
-                    with suppress(FormatError):  # it is missing in some states
+                    with suppress(
+                        FormatError
+                    ):  # the quantity is missing in some states
                         name = database.quantities[quantity]
                         columns[quantity] = database.channel(name)
         return columns
@@ -356,7 +358,7 @@ class OpenedRun:
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        if not energies[:, ~left_out].any():  # only springs have energy
+        if not energies[:, ~left_out].any():  # true if only springs have energy
             left_out[:] = False
         idle = [
             part

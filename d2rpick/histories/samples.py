@@ -113,7 +113,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # usually
+    if np.all(time[1:] > time[:-1]):  # the usual case: ascending times
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
     equal = int(np.count_nonzero(step == 0))

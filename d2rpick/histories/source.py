@@ -83,7 +83,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # checked whenever they are read
+    families = _open_families(files)  # families are checked whenever they are read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -314,7 +314,7 @@ def _unpack_pieces(
 
     pieces: list[bytes] = []
     size = 0
-    unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
+    unpacker = zlib.decompressobj(wbits=31)  # 31 selects the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         unread = packed[end - _BLOCK : end]
         while unread:
@@ -355,5 +355,5 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of the leg, 0 without a number."""
     match = _NUMBERED.fullmatch(name)
-    assert match is not None  # it matches any text
+    assert match is not None  # the pattern matches any text
     return match[1], int(match[2] or 0)

@@ -323,7 +323,9 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
         ignore_missing_letters(),
     ):
         canvas: Any = FigureCanvasSVG(figure)
-        canvas.print_svg(content, metadata=nothing)  # `Figure.savefig` draws it twice
+        canvas.print_svg(
+            content, metadata=nothing
+        )  # `Figure.savefig` would draw the figure twice
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(

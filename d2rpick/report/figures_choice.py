@@ -81,7 +81,7 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # distinguishable without colour, too
+}  # line styles that are distinguishable without colour
 # height of the figure in a file, and of the axes on a page [inch]
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.report.formats import DisplayOptions
 
-# fields of each run, in JSON and as columns
+# fields of a run in JSON, and columns of the table
 RUN: Final = row(
     *(
         Field(key, "number")

@@ -99,7 +99,7 @@ class Unreadable(NamedTuple):
 
     @property
     def code(self) -> str:
-        """Return the code of the warning that reports it."""
+        """Return the code of the warning that reports this deck."""
         return "unreadable-deck" if isinstance(self.error, FORESEEN) else INTERNAL_ERROR
 
     @property
@@ -253,7 +253,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # empty for Radioss
+        ]  # empty for Radioss decks
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -445,7 +445,9 @@ class RunCase(Case):
         """Return the harmful effects of the starter on the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
-        from d2rpick.deck.radioss_flaws import find_flaws  # loads numpy
+        from d2rpick.deck.radioss_flaws import (
+            find_flaws,
+        )  # imported here: it loads numpy
 
         return find_flaws(self.run, self.run.named)
 

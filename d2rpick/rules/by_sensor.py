@@ -30,7 +30,9 @@ class Sensed(NamedTuple):
     ) -> Iterator[tuple[float, SwitchEvent]]:
         """Yield time and event of each switch: rigid while the control is on, deformable while it is off."""
         set_events = [event for event in events if event.by is self.by]
-        begins_off = self.changes[:1] == (Change(0.0, on=False),)  # nothing to undo
+        begins_off = self.changes[:1] == (
+            Change(0.0, on=False),
+        )  # a control that begins OFF has nothing to undo
         for change in self.changes[begins_off:]:
             for event in set_events:
                 to_rigid = event.line.to_rigid == change.on

@@ -41,7 +41,7 @@ _KEEPS: Final = (
     write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
-)  # Ikrem
+)  # with Ikrem 1
 # Arguments of a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
@@ -352,7 +352,9 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
     """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    from d2rpick.deck.mesh import find_parts_with_elements  # loads numpy
+    from d2rpick.deck.mesh import (
+        find_parts_with_elements,
+    )  # imported here: it loads numpy
 
     parts = find_parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)

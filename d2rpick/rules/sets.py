@@ -455,7 +455,7 @@ def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
     landed = _make_delayed_deck(wait).deck.replace(
         "       0.2", "       0.7", 1
-    )  # ENDTIM
+    )  # with this ENDTIM
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 

@@ -312,7 +312,9 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import find_shared_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_shared_nodes,
+    )  # imported here: it loads numpy
 
     for (low, high), node in find_shared_nodes(cards, bodies).items():
         if _is_rigid_together(case, first[low].unit, first[high].unit):
@@ -391,7 +393,9 @@ def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
-    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_first_parts,
+    )  # imported here: it loads numpy
 
     return find_first_parts(cards, parts)
 
@@ -595,7 +599,9 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True) if joining else ()
     if not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_parts_of_nodes,
+    )  # imported here: it loads numpy
 
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
     joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))

@@ -40,7 +40,7 @@ def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
     """Yield sensor kind and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            # /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
+            # keywords are /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
             yield "INTER", get_number(card, 2) or get_number(card, 3)
     for card in starter.named("RWALL"):
         yield "RWALL", get_number(card, -1)

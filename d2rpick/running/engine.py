@@ -230,7 +230,7 @@ class Solver:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            with suppress(KeyboardInterrupt):  # pressed again
+            with suppress(KeyboardInterrupt):  # the user may interrupt again
                 while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
 

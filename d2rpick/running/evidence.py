@@ -39,7 +39,7 @@ class GrowingEvidence:
     def __init__(self) -> None:
         self._record = GrowingRecord()
         self._of_parts: list[GrowingWitness] = []
-        self._of_model: list[GrowingWitness] = []  # at most one
+        self._of_model: list[GrowingWitness] = []  # at most one witness
         # Witnesses of sets of parts that still continue, by the indices of their parts.
         self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
         self._first_momenta: Samples | None = None
@@ -264,7 +264,7 @@ class GrowingEvidence:
 
 
 def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
-    """Find all flights of a finished record, as `Evidence.flights`."""
+    """Find all flights of a finished record, as `GrowingEvidence.flights` does."""
     evidence = GrowingEvidence()
     evidence.take(history)
     return evidence.flights(needed)

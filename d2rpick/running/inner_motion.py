@@ -100,7 +100,7 @@ class _Motion:
         # State of the last turn, None before any motion, and of the extreme value since then.
         self._turn: int | None = None
         self._extreme, self._rising = 0, False
-        self._first_moved: float | None = None  # [time]
+        self._first_moved: float | None = None  # time of the first motion [time]
 
     @property
     def begins(self) -> float:

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-# A record with fewer states is read completely, since results from all states may change, such as which parts are
-# springs.
+# A record with fewer states is read completely, since early results may change, such as which parts are springs.
 _FEWEST_STATES: Final = 200
 
 
@@ -72,7 +71,7 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            self._read_files, self._last_states = {}, []  # a file is gone
+            self._read_files, self._last_states = {}, []  # a file was removed
         history = self._read_on(names)
         new_states = None
         if history is not None:

@@ -158,7 +158,7 @@ def identify(
     )
     if (
         quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # other fits leave more than the richest model
+    ):  # all other fits leave a larger misfit than the richest model
         return _is_out_of_reach(time)
     fits = (
         (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
@@ -344,7 +344,9 @@ def _judge_attempt(
     spread = float(np.std(e))
     structure = fitting.measure_structure(remainder)
     local = attempt.scaled.vibration_energy(s)
-    vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
+    vibration = float(
+        np.hypot.reduce(local) / np.sqrt(s.size)
+    )  # the norm avoids the overflow of squares
     # if noise exceeds the vibration, a misfit does not show a further mode
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials
 
-# Smallest relevant line, relative to the strongest one, and to a partner line, and in units of its scatter.
+# Smallest relevant line relative to the strongest line, the same relative to a partner line, and in units of scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
 # Two rates are equal if they differ by less than this share of a turn over the record.
 _SAME_RATE: Final = 0.1

@@ -61,7 +61,7 @@ _MOST_DRIFT: Final = (
     0.6  # change of the static energy relative to the mean vibration energy
 )
 _MOST_BEYOND: Final = 0.12  # overlap beyond its bounds relative to the vibration energy, rms over all pairs
-_MOST_HARMONIC: Final = 0.05  # size of harmonics relative to their line
+_MOST_HARMONIC: Final = 0.05  # size of harmonics relative to their fundamental line
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
     0.15,
     0.6,
@@ -74,8 +74,8 @@ _TIMES_PER_PERIOD: Final = 16
 # Refinement of these times between which the energy is linear.
 _FINER: Final = 4
 
-# Modes show a flight if their misfit is below this share of the energy range,
-# and their prediction error below the second share.
+# Largest misfit of modes that show a flight, as a share of the energy range.
+# The second value limits the prediction error of such modes.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # Initial half-width of the band of R^2, before it is widened for known errors.

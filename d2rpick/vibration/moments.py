@@ -34,8 +34,8 @@ _DROWNED = 0.2
 # Times closer than this share of a radian are equal within rounding.
 _ZERO = 1e-9
 
-# Kinds of moments: crossing of the level, extremum near the level, match of several deformations,
-# start of a flight without vibration, and given time.
+# Kinds of moments: crossing of the level, extremum near the level, and match of several deformations.
+# Further kinds are the start of a flight without vibration, and a given time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 # Between samples E'' may exceed the second differences. On random vibrations with at least 8 samples per period,
 # 25 % more covers 99 % of the true crossings.
@@ -139,7 +139,9 @@ class OscillatorEnergy(SampledEnergy):
         ):
             return None  # impossible even if the complete scatter of the fit were here
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
-        if vibration > 0 and scatter <= _DROWNED * vibration:  # both may underflow
+        if (
+            vibration > 0 and scatter <= _DROWNED * vibration
+        ):  # both energies may underflow
             return None
         finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
         return f"{finding}: the sign of the deformation is unknown"
@@ -213,7 +215,7 @@ class OscillatorEnergy(SampledEnergy):
     ) -> Samples:
         """Apply one function to times in the window described by the modes, another function to all others."""
         is_described = self.within(times)
-        if is_described.all():  # nearly always
+        if is_described.all():  # the usual case: modes describe all times
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (

@@ -176,7 +176,7 @@ class Oscillator:
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
         for column, value in zip(states, start, strict=True):
-            column[:1] = value  # exactly as given
+            column[:1] = value  # the first value is exactly the given one
         return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:

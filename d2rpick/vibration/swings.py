@@ -205,7 +205,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
     """Return the indices at which the energy turns, and the last turn that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    if 4 * turning_points.size > energy.size:  # noise
+    if 4 * turning_points.size > energy.size:  # so many turning points are noise
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
     turns = []

@@ -57,7 +57,7 @@ _MOST_LEFT: Final = 0.01
 _MOST_HIDDEN: Final = 0.01
 # Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear.
 _OFF: Final = 0.2
-_MOST_OFF: Final = 0.5  # of the samples
+_MOST_OFF: Final = 0.5  # largest share of the samples with an unclear sign
 _ROUNDS: Final = 4  # repetitions until the fitted window contains all clear times
 
 

@@ -34,8 +34,8 @@ EQUALLY_GOOD = 0.02
 LIKE_LEVELS = TOLERATED_GROWTH
 # Largest level error of a crossing by rounding, for levels above this share of the highest energy [-].
 ROUNDING: Final = 1e-3
-# Decimals to which errors are compared. Pairs of equal error, as in all cycles of one mode, differ by rounding,
-# which must not decide their order.
+# Decimals to which errors are compared.
+# Pairs of equal error, as in all cycles of one mode, differ by rounding, which must not decide their order.
 _DECIMALS: Final = 4
 # Rigid times within this share of the longest are similar; then a small position error decides [-].
 _LIKE_TIMES = 0.1

@@ -28,8 +28,8 @@ _BELOW = 1e-12
 
 # Largest error of the polyline [-]: half of the last printed digit.
 _EXACT: Final = 5e-4
-# Number of bisections of an interval with a curved error: a square root at zero energy is then exact to 1/4000,
-# a parabola much sooner.
+# Number of bisections of an interval with a curved error.
+# A square root at zero energy is then exact to 1/4000, and a parabola is far more exact.
 _HALVINGS: Final = 20
 
 

@@ -61,7 +61,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """CPU time of one leg of a run per cycle [us], and what the leg computed.
+    """CPU time of one leg of a run per cycle [us], and the elements and nodes computed in the leg.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """

@@ -111,7 +111,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # no part ever deforms
+    except FormatError as error:  # raised if no part ever deforms
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts

@@ -309,7 +309,7 @@ def _check_locked_in_energy(
 ) -> Iterator[str]:
     """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # without a vibration its error has no meaning
+        return  # without a vibration the relative error has no meaning
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:

@@ -277,7 +277,7 @@ def _warn_about_deforming(
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
-        return  # a free fall looks the same
+        return  # parts without internal energy may also be in free fall
     where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
     raise RangeError(
         f"{where}, a window that is said to be done; give the run that was switched so"

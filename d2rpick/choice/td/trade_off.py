@@ -154,7 +154,9 @@ def make_offers(
             for candidates in candidates_of_each
         ]
         judged_up_to_best = judged.at(np.concatenate(orders))
-        ends = accumulate(rows.size for rows in orders)  # noise makes many candidates
+        ends = accumulate(
+            rows.size for rows in orders
+        )  # noisy records have many candidates
         for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
             best = replace(
                 candidates,
@@ -290,7 +292,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
         }
         for offer in sorted(group, key=lambda offer: printed[offer.td]):
             rigid, error = printed[offer.td]
-            # equal pairs do not exclude each other
+            # equal pairs are both Pareto-optimal
             if error < smallest_error or (error, rigid) == (
                 smallest_error,
                 longest,

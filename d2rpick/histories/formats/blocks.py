@@ -346,7 +346,9 @@ def parse_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
+    values: Samples = weights @ digits[:-2].astype(
+        np.float64
+    )  # mantissas are exact up to here
     tens, units = digits[-2:]
     scale = (
         tens * np.uint8(10)

@@ -33,7 +33,7 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
 # Replacement for a number that is too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
-# Pattern of a number by its decimal sign.
+# Patterns of a number, by the decimal sign.
 # The quantifiers are possessive (no backtracking), so that the time is linear in the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),

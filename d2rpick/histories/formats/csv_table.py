@@ -422,7 +422,7 @@ class Table(Database):
         self._notes += [note for note in table.notes if note not in self._notes]
         for column, values in zip(columns, table.columns, strict=True):
             values.flags.writeable = (
-                False  # so that callers can share it without copies
+                False  # read-only, so that callers can share the array without copies
             )
             self._read[column] = values
 

@@ -218,7 +218,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # None becomes NaN
+        # parse_cell returns None for other text, which becomes NaN
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:

@@ -26,7 +26,7 @@ _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
 _NUMBERING: Final = 10  # words of the section of numbers before the ids
-_PART_NUMBERING: Final = 16  # the same for a section with part ids
+_PART_NUMBERING: Final = 16  # words of the section of numbers if it has part ids
 _TITLE: Final = 72  # bytes of a title for both word widths
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
@@ -101,8 +101,8 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        self.at += version == 4  # number of chambers
-        # type and name of each value
+        self.at += version == 4  # this version has a word for the number of chambers
+        # a type and a name for each value
         self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle

@@ -267,7 +267,7 @@ class Blocks(Database):
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
 
-    # How blocks are found
+    # How blocks are found.
 
     def _walk(self) -> None:
         """Find all sequences of blocks; leave out incomplete blocks."""
@@ -419,7 +419,9 @@ class Blocks(Database):
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        end = int(offsets.max()) + self._grammar.width + 1  # with the next character
+        end = (
+            int(offsets.max()) + self._grammar.width + 1
+        )  # the character after the number must be there, too
         text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride

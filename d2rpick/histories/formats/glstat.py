@@ -95,7 +95,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        self._even = True  # until a state lacks a line of the others
+        self._even = True  # becomes False if a state lacks a line of the others
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
@@ -140,7 +140,7 @@ def _describe_glstat_block(
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
-        # a line between these lost some of its columns
+        # a truncated line in between may belong to another state
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()

@@ -155,7 +155,9 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; a contiguous one that fills most of the file is a view of ``content``."""
-    start = dataset.id.get_offset()  # None for data in chunks or in other files
+    start = (
+        dataset.id.get_offset()
+    )  # there is no offset for data in chunks or in other files
     if start is None:
         return dataset[()]
     if not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
@@ -181,7 +183,9 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    read_groups: list[str] = []  # groups that a reader of their layout reads completely
+    read_groups: list[
+        str
+    ] = []  # groups that are read completely by a reader of their layout
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if any(step.startswith(_BOOKKEEPING) for step in name.split("/")):
@@ -270,7 +274,9 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]  # without the zone
+    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[
+        0
+    ]  # path of the variable without the zone
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
     numbers = [] if entities is None else np.ravel(entities[()]).tolist()

@@ -59,7 +59,7 @@ _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 # Time-out of a read: 60 s plus 1 s per 100 kB. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
-_SLOWEST: Final = 100_000  # bytes per second
+_SLOWEST: Final = 100_000  # slowest expected reading speed [bytes/s]
 _USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
 
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # symbol tables and their entries
+_TABLES: Final = range(4, 8)  # types of records: symbol tables and their entries
 _LONGEST: Final = 1 << 32  # bytes; a symbol table is shorter
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
@@ -200,7 +200,7 @@ class Lsda:
         unpack = self._head.unpack_from
         head = self._head.size
         size, name_length = len(data), head + self._type.size
-        near, base = b"", 0  # the bytes around the position
+        near, base = b"", 0  # bytes around the current position
         path: tuple[str, ...] = ()
         number = -1
         start = position

@@ -38,7 +38,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-# adjacent in the file
+# Quantities that are adjacent in the file.
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
@@ -68,7 +68,9 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
+_CHANGING: Final = re.compile(
+    rb" {0,12}[+-]?\d[\d+-]*"
+)  # numbers in lines that may vary between states
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
@@ -265,7 +267,7 @@ def _describe_matsum_block(
             doubled = (part, _MAT) in fields
             if doubled:  # with two groups of lines for one part, neither is reliable
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            # with the line end before it
+            # the offset includes the line end before the line
             fields[part, _MAT] = UNSURE if doubled else line.start() - 1
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())

@@ -32,7 +32,7 @@ _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n"
 _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
-_LONG, _SHORT = 10, 5  # columns of integers
+_LONG, _SHORT = 10, 5  # columns of an integer, in the two formats
 _STARS: Final = b"*" * _SHORT  # printed by Fortran for a number that is too long
 _ROOM: Final = 1024  # bytes; a header record is shorter, apart from its integers
 _RUN_TITLE: Final = 72  # characters of the title of the run in text (80 in binary)

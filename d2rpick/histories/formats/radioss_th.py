@@ -94,7 +94,7 @@ class _Head(NamedTuple):
     # index of a part's variable among the variables of all parts
     columns: dict[tuple[int, str], int]
     counts: tuple[int, ...]  # numbers in the records of one state
-    groups: tuple[_Group, ...]  # their records are the last ones of a state
+    groups: tuple[_Group, ...]  # groups whose records are the last ones of a state
 
 
 def recognises(head: bytes) -> bool:

@@ -111,7 +111,9 @@ class _Curve:
         self._read: list[Samples] = []  # states of the earlier pieces
         self._current: list[list[float]] = []  # states of this piece so far
         self._below: _Below | None = None
-        self._repeated = 0  # states of the table that are repeated below it
+        self._repeated = (
+            0  # number of states of the table that are repeated below the table
+        )
         self._repeated_from = 0  # line of the first repeated state
 
     @property

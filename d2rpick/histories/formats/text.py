@@ -164,7 +164,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
             data[address : address + piece] for address in range(0, len(data), piece)
         )
         if all(map(_is_plain, pieces)):
-            return data, "latin-1"  # contains ASCII
+            return data, "latin-1"  # Latin-1 contains ASCII
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
@@ -283,7 +283,7 @@ def _count_significant_digits(field: str) -> int:
         return 0
     digits = parts[1] + parts[2]
     if not digits.lstrip("0") and parts[3]:
-        return len(digits)  # 0.00000E+00 has six
+        return len(digits)  # the number 0.00000E+00 has six significant digits
     return len(digits.lstrip("0"))
 
 
