@@ -1,5 +1,6 @@
 """Energy histories that several tests use, and helpers to choose times in them and read the warnings."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TypeVar, cast
 
@@ -9,7 +10,6 @@ from d2rpick.choice.answers import PairSuggestion, suggest_in_run
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.histories.history import History
 from d2rpick.histories.run import OpenedRun
-from d2rpick.vibration.span import Fits
 from tests.command import ROLLOVER
 
 T = TypeVar("T")
@@ -52,7 +52,19 @@ def suggest_in_window(
     history: History,
     window: tuple[float, float] | None,
     settings: Settings,
-    fits: Fits | None = None,
 ) -> PairSuggestion:
     """Choose tr and td in a history made in memory."""
-    return suggest_in_run(make_reference(history), window, settings, fits=fits)
+    return suggest_in_run(make_reference(history), window, settings)
+
+
+def forget(history: History) -> History:
+    """Return the same record without what was computed for it."""
+    return replace(history)
+
+
+def count_fits(history: History) -> int:
+    """Return the number of fits that were computed for a record, rather than remembered."""
+    functions = (function for function, *_ in history.memory.results)
+    return sum(
+        function.__module__.startswith("d2rpick.vibration") for function in functions
+    )

@@ -20,6 +20,7 @@ import numpy as np
 
 from d2rpick.api.runs import extract_columns, read as open_files
 from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.pair.candidates import Candidate
 from d2rpick.choice.question import Settings, read_reference
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
@@ -66,7 +67,9 @@ class Relation(NamedTuple):
     Times of the second answer are ``scale`` times those of the first, and later by ``shift`` record lengths.  If it is
     ``exact``, everything must be equal except for rounding.  If it ``may_lose`` information, the second history may be
     too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` evidence than the
-    first, equally good pairs may change places: another tr of the same residual may be chosen.
+    first, equally good pairs may change places: states that are left out and the band of a second energy decide among
+    them.  The second answer then either has the same tr, or a tr that the first answer lists as well and whose residual
+    is that of its chosen tr within the stated ``+-``.
     """
 
     change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
@@ -78,7 +81,10 @@ class Relation(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """Values of an answer that are compared; None if unknown."""
+    """Values of an answer that are compared; None if unknown.
+
+    ``as_good`` are the tr whose residual is that of the chosen one within the ``+-`` of both.
+    """
 
     tr: float | None
     half_width: float
@@ -86,6 +92,7 @@ class Chosen(NamedTuple):
     residual_width: float
     grade: str
     basis: str
+    as_good: tuple[float, ...] = ()
 
 
 def make_run(random: Random) -> MadeRun:
@@ -449,10 +456,28 @@ def choose(question: Asked) -> Chosen:
         if best.tr_low is not None and best.tr_high is not None
         else 0.0
     )
-    above = (best.residual_high or 0.0) - (best.residual or 0.0)
-    return Chosen(
-        best.tr, half_width, best.residual, max(above, 0.0), grade, answer.basis
+    as_good = tuple(
+        candidate.tr
+        for candidate in answer.candidates
+        if candidate.residual is not None
+        and best.residual is not None
+        and abs(candidate.residual - best.residual)
+        <= get_residual_width(candidate) + get_residual_width(best)
     )
+    return Chosen(
+        best.tr,
+        half_width,
+        best.residual,
+        get_residual_width(best),
+        grade,
+        answer.basis,
+        as_good,
+    )
+
+
+def get_residual_width(candidate: Candidate) -> float:
+    """Return how far above its stated value the residual may lie."""
+    return max((candidate.residual_high or 0.0) - (candidate.residual or 0.0), 0.0)
 
 
 def find_difference(
@@ -471,8 +496,10 @@ def find_difference(
             if relation.exact
             else relation.scale * first.half_width + second.half_width
         )
-        alike = relation.shows_other and first.residual is not None
-        if abs(second.tr - moved) > stated + _ROUNDED * span and not alike:
+        room = stated + _ROUNDED * span
+        is_listed = any(abs(second.tr - tr) <= room for tr in first.as_good)
+        is_alike = relation.shows_other and is_listed
+        if abs(second.tr - moved) > room and not is_alike:
             return f"tr {moved:.9g} became {second.tr:.9g}, stated to {stated:.2g}"
     if first.residual is not None and second.residual is not None:
         stated = 0.0 if relation.exact else first.residual_width + second.residual_width

@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
-    from d2rpick.vibration.span import Fits
 
 # Most pairs at other peaks that are examined in full and refused before the search ends.
 _MOST_REFUSED = 3
@@ -154,7 +153,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is reused if its td is ``td``, otherwise its fits are.
+    """Judge one pair; the situation ``earlier`` is reused if its td is ``td``.
 
     Raises
     ------
@@ -164,8 +163,7 @@ def verify_in_history(
     _check_order(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
-    fits = earlier.fits if earlier else None
-    return verify_at(examine_td(history, td, settings, fits), tr)
+    return verify_at(examine_td(history, td, settings), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> PairVerdict:
@@ -445,9 +443,7 @@ def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, as if the user had given that td."""
     # an oscillator is searched again, but not the reason for its absence
     quick = situation.evidence.span is None
-    return examine_td(
-        situation.history, td, situation.settings, situation.fits, quick=quick
-    )
+    return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
@@ -483,15 +479,13 @@ def suggest_in_run(
     settings: Settings,
     *,
     with_better: bool = True,
-    fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high), or in the longest flight for None [time].
 
-    With ``with_better`` False no better td is searched for a given td.  ``fits`` are those of an earlier call for the
-    record with the same settings.  If td is chosen, no flight is assumed to begin before ``since``, and ``times`` are
-    tried besides the energy peaks, by default an even grid [time].
+    With ``with_better`` False no better td is searched for a given td.  If td is chosen, no flight is assumed to begin
+    before ``since``, and ``times`` are tried besides the energy peaks, by default an even grid [time].
 
     Raises
     ------
@@ -505,14 +499,14 @@ def suggest_in_run(
             choose_td,
         )
 
-        chosen = choose_td(reference.history, td, settings, fits, since, times)
+        chosen = choose_td(reference.history, td, settings, since, times)
         answer = suggest_at(chosen.situation)
         answer = replace(
             answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
         )
     else:
         answer = suggest_at(
-            examine_td(reference.history, td, settings, fits), with_better=with_better
+            examine_td(reference.history, td, settings), with_better=with_better
         )
     return _add_health(answer, reference.run)
 

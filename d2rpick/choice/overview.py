@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -167,42 +168,20 @@ def describe_run(
     if deck is not None:
         run, deck_warnings = _apply_deck(run, deck)
     first = run.databases[0]
-    notes = list(run.left_out)
-    for database in run.databases:
-        notes += _read_notes(database)
-    notes += note_doubts(run.databases)
-    notes += run.unused_energies(selection)
-    states = None
-    time = np.empty(0)
-    # several columns may be the time, but they can be listed
-    try:
-        if first.span is not None:
-            time = first.time if first.channels else first.part_time
-        states = int(time.size)
-    except FormatError as error:
-        if (
-            first.format == "csv"
-            and give_if_written(lambda: first.energy_channel) is not None
-        ):
-            raise  # the time column is given, so the table itself cannot be read
-        notes.append(str(error))
+    time, refusal = _read_times(first)
+    states = int(time.size) if refusal is None else None
     history = _read_history(run, selection)
-    flaws = (
-        tuple(list_flaws(history))
-        if history
-        else tuple(_warn_about_missing_energy(run, selection))
-    )
-    rigid = find_rigid_times(Reference(run, history)) if history else ()
-    flights = (
-        _find_flights_to_choose_from(
+    rigid: tuple[Times, ...] = ()
+    flights: tuple[tuple[str, FreeFlight], ...] = ()
+    if history:
+        flaws = tuple(list_flaws(history))
+        rigid = find_rigid_times(Reference(run, history))
+        flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
-        if history
-        else ()
-    )
-    channels: dict[str, None] = {}
-    for database in run.databases:
-        channels |= dict.fromkeys(database.channels)
+    else:
+        flaws = tuple(_warn_about_missing_energy(run, selection))
+    channels = dict.fromkeys(chain.from_iterable(d.channels for d in run.databases))
     should_write = None
     if states != 0 and not any(momenta.parts for momenta in run.momenta(None, None)):
         should_write = _name_missing_output(run)
@@ -224,7 +203,7 @@ def describe_run(
         health=_assess_health_of_run(
             run, history, [flight for _, flight in flights], rigid
         ),
-        notes=tuple(dict.fromkeys(notes)),
+        notes=tuple(dict.fromkeys(_list_notes(run, selection, refusal))),
         alarms=(
             *(flaws if history else ()),
             *_warn_about_rigid_legs(rigid),
@@ -235,6 +214,41 @@ def describe_run(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
     )
+
+
+def _read_times(first: Legs) -> tuple[Samples, str | None]:
+    """Return the times of the states, and a message if they have to be chosen among several columns.
+
+    Raises
+    ------
+    FormatError
+        If the times cannot be read although one energy shows which column they are.
+    """
+    time = np.empty(0)
+    try:
+        if first.span is not None:
+            time = first.time if first.channels else first.part_time
+    except FormatError as error:
+        if (
+            first.format == "csv"
+            and give_if_written(lambda: first.energy_channel) is not None
+        ):
+            raise
+        return time, str(error)
+    return time, None
+
+
+def _list_notes(
+    run: OpenedRun, selection: Selection, refusal: str | None
+) -> Iterator[str]:
+    """Yield what the readers left out or assumed, with the ``refusal`` of the times."""
+    yield from run.left_out
+    for database in run.databases:
+        yield from _read_notes(database)
+    yield from note_doubts(run.databases)
+    yield from run.unused_energies(selection)
+    if refusal is not None:
+        yield refusal
 
 
 def _measure_sampling(time: Samples) -> Sampling | None:
@@ -298,7 +312,8 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
         energies = np.empty((0, 0))
     if energies is None:  # a part is missing in some states, so its column has gaps
         return (
-            PartOverview(part, _find_highest_energy(run, part)) for part in run.parts
+            PartOverview(part, _find_highest_energy_of_part(run, part))
+            for part in run.parts
         )
     return (
         PartOverview(part, _find_maximum(column))
@@ -306,7 +321,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
     )
 
 
-def _find_highest_energy(run: OpenedRun, part: Part) -> float | None:
+def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
     """Return the highest internal energy of a part [energy]; None if it is not written."""
     return give_if_written(lambda: _find_maximum(run.part_energies([part])))
 

@@ -301,6 +301,15 @@ class Placement:
         }
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
+    def find_nodes(self, parts: Collection[int]) -> Reals:
+        """Return the positions of all nodes of the elements of some parts, shape (n, 3) [length]."""
+        numbers = [
+            elements.nodes[np.isin(elements.part, list(parts))].ravel()
+            for elements in self._inventory.elements
+        ]
+        nodes = np.unique(np.concatenate(numbers))
+        return np.asarray(self._inventory.coordinates[nodes[nodes != NO_NODE]])
+
     def hanging_together(self, parts: Collection[int]) -> frozenset[int]:
         """Return the largest group of these parts that are connected by shared nodes."""
         groups = self._inventory.groups(parts)

@@ -413,10 +413,17 @@ def _print_sensors(
         for leg in plan_legs(windows, end, printing.step_cap)
         if leg.cap is not None
     )
+    step_warning = (
+        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
+        " where it takes fewer without switching, set --step-cap to the deformable step or more."
+    )
+    # In the file too, since it may be used without the card.
+    comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",
         RUN.write(Tstop=end),
         *write_bodies_off(printing.off),
+        *comments,
         *write_step_limit(cap),
     )
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
@@ -425,14 +432,10 @@ def _print_sensors(
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
     )
-    step_warning = (
-        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
-        " where it takes fewer without switching, set --step-cap to the deformable step or more."
-    )
     card = _combine_card(
         tuple(windows),
         printing,
-        (*_OF_SENSORS, *instructions, step_warning, *remarks),
+        (*_OF_SENSORS, *instructions, *remarks),
         files,
         texts,
     )

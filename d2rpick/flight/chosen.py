@@ -121,10 +121,8 @@ def start_flight_at(
         or flight.source == "energy"
         or _is_elsewhere(flight, td, after)
     ):
-        if described is None:  # cached, because many td have the same landing
-            end = history.known.once(
-                ("landing", after), lambda: find_landing_after(history, after)
-            )
+        if described is None:
+            end = find_landing_after(history, after)
         else:
             end = _find_end_of_window(history, described)
         return Flight(

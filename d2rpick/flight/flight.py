@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.contact_forces import Touches, is_deformed
 from d2rpick.flight.internal_energy import (
@@ -221,9 +222,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
             return _find_nearest(witness, td, refusal, doubts)
     if not flights:
         return Seen()
-    return history.known.once(
-        ("confirmed", *flights), lambda: _join_evidence(history, flights)
-    )  # cached, because many td have the same result
+    return _join_evidence(history, *flights)
 
 
 def _explain_refusal(history: History, witness: Witness, td: float) -> str:
@@ -273,7 +272,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
                     if other_flight
                 ),
             ]
-            confirmed = _join_evidence(history, agreeing)
+            confirmed = _join_evidence(history, *agreeing)
             if confirmed.flight and not confirmed.refusal:
                 confirmed_flights.append((witness.source, confirmed.flight))
         if flights or witness.decisive:
@@ -289,9 +288,10 @@ def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
     return witness.source in _AGREEING and flight.parts is None
 
 
+@remember
 def list_witnesses(history: History) -> tuple[Witness, ...]:
-    """Return the sources of evidence of a history, best first; they are computed once for all td."""
-    return history.known.once("witnesses", lambda: tuple(_make_witnesses(history)))
+    """Return the history's sources of evidence, best first."""
+    return tuple(_make_witnesses(history))
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
@@ -472,10 +472,9 @@ def name_source(source: str | None) -> str:
     return str(source).replace("-", " ")
 
 
-def _join_evidence(
-    history: History, shown_flights: Sequence[tuple[str, FreeFlight]]
-) -> Seen:
-    """Combine the flights of the best source with those of the sources that should agree, and note contradictions."""
+@remember
+def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> Seen:
+    """Join the flights of the best source and of those that should agree with it, and note disagreements."""
     source, best = shown_flights[0]
     refusal = _explain_why_driven(history, source, best)
     if refusal:

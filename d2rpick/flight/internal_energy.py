@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.window import FEWEST, SHORTEST
 from d2rpick.histories.samples import find_crossings, find_window
@@ -102,6 +103,7 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
     )
 
 
+@remember
 def find_landing_after(history: History, start: float) -> float | None:
     """Return the first time after ``start`` at which the energy leaves its former range quickly [time], or None.
 
@@ -173,13 +175,16 @@ def _find_last_push(history: History, start: float, td: float) -> float:
     time = history.time[inside]
     if time.size < FEWEST:
         return start
-    rates = history.known.once(
-        "rates", lambda: np.abs(np.diff(history.energy)) / np.diff(history.time)
-    )
-    rates = rates[inside.start : inside.stop - 1]
+    rates = _compute_rates(history)[inside.start : inside.stop - 1]
     usual = rates[time[1:] >= td - _LATEST * (td - start)].max(initial=0.0)
     fast = np.flatnonzero(rates > _FASTER * usual)
     return float(time[fast[-1] + 1]) if fast.size else start
+
+
+@remember
+def _compute_rates(history: History) -> Samples:
+    """Return how fast the energy changes between two states, shape (n - 1,) [energy/time]."""
+    return np.asarray(np.abs(np.diff(history.energy)) / np.diff(history.time))
 
 
 def _find_burst(history: History, start: float, td: float) -> float | None:
@@ -196,9 +201,7 @@ def _find_change_of_level(history: History, start: float, td: float) -> float | 
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:
         return None
-    sums = history.known.once(
-        "sums", lambda: np.append(0.0, np.cumsum(history.energy))
-    )[inside.start :]
+    sums = _sum_energies(history)[inside.start :]
     means = (sums[width:] - sums[:-width]) / width
     first_after = (
         inside.stop - inside.start
@@ -210,12 +213,19 @@ def _find_change_of_level(history: History, start: float, td: float) -> float | 
     return None
 
 
+@remember
+def _sum_energies(history: History) -> Samples:
+    """Return the sums of the energies of the first 0, 1, ... n states, shape (n + 1,) [energy]."""
+    return np.append(0.0, np.cumsum(history.energy))
+
+
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
     """Return the band of some values, widened at both ends by a share of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 
 
+@remember
 def round_off(history: History) -> float:
     """Return the energy below which an internal energy is round-off compared with the energies of the run [energy]."""
     balance = history.balance
@@ -223,9 +233,7 @@ def round_off(history: History) -> float:
     if balance:
         terms += [balance.internal, balance.kinetic]
         terms += [balance.external_work, balance.total]
-    return history.known.once(
-        "round-off", lambda: _ROUND_OFF * find_largest(history.energy, *terms)
-    )
+    return _ROUND_OFF * find_largest(history.energy, *terms)
 
 
 def find_largest(*terms: Samples | None) -> float:

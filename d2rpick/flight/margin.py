@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Smallest margin as a share of the flight. In 36 computed runs (a car-like structure, a box with a block inside)
-# landings moved by up to 1.1 % and 2.5 % of the flight before them.
-SHARE: Final = 0.03
-# Fewest states that are searched for a force.
+# Least margin as a share of the flight. Landings of 36 computed runs (a car-like structure, a box with a block inside,
+# OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
+LEAST_MARGIN: Final = 0.03
+# Fewest states in which a force is looked for.
 _FEWEST: Final = 3
 # A contact grazes the body if its force stays below this share of the largest force on the body,
 # or if it changes the momentum by less than this share of the momentum towards it.
@@ -48,6 +48,7 @@ def compute_margin(
     flight: Flight,
     given: float | None = None,
     place: float | None = None,
+    turning: float = 0.0,
 ) -> Margin:
     """Return the margin before the contact that ends a flight: the given one, or else how much earlier it may come.
 
@@ -60,14 +61,16 @@ def compute_margin(
     given : float, optional
         [time]
     place : float, optional
-        Place error of the body at the contact [length], see `landing_moves`.
+        Place error of the body at the contact [length], see `estimate_landing_spread`.
+    turning : float
+        What the rotation of the body adds to its speed where it touches [length/time].
     """
     if given is not None:
         return Margin(given, "given")
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
-    share = SHARE * (flight.end - flight.start)
-    spread = estimate_landing_spread(history, flight, place)
+    share = LEAST_MARGIN * (flight.end - flight.start)
+    spread = estimate_landing_spread(history, flight, place, turning)
     if spread is None or spread <= share:
         margin = Margin(share, "flight", spread)
     else:
@@ -85,17 +88,21 @@ def compute_margin(
 
 
 def estimate_landing_spread(
-    history: History, flight: Flight, place: float | None
+    history: History, flight: Flight, place: float | None, turning: float = 0.0
 ) -> float | None:
     """Return how far a switch may move the next landing, by its velocity error and its position error [time].
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
-    towards the ground.  None if neither error is known.
+    towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
+    [length/time].  If the surface there moved away from the ground the body would touch elsewhere, and the speed of the
+    centre of mass counts.  None if neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
     speed = _compute_closing_speed(history, flight)
     if place is None or speed is None:
         return spread
+    if speed + turning > 0:
+        speed += turning
     out_of_place = place / speed if speed > 0 else float("inf")
     return out_of_place if spread is None else spread + out_of_place
 
@@ -311,6 +318,25 @@ def _select_momenta_of_flight(
         flying = {part.id for part in flight.parts}
         return momenta, [i for i, part in enumerate(momenta.parts) if part.id in flying]
     return None
+
+
+def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
+    """Return the unit vector (3,) along which gravity changes the momentum in a flight, without gravity that of motion.
+
+    None if the momentum is not written, or nothing moves.
+    """
+    momentum_of_body = _select_momenta_of_flight(history, flight)
+    if momentum_of_body is None:
+        return None
+    momenta, members = momentum_of_body
+    inside = find_window(momenta.time, *flight.within(momenta.time))
+    momentum = momenta.of(members)[inside]
+    if len(momentum) < 2:
+        return None
+    change = momentum[-1] - momentum[0]
+    along = change if change.any() else momentum[-1]
+    size = float(np.linalg.norm(along))
+    return np.asarray(along / size) if size > 0 else None
 
 
 def _compute_closing_speed(history: History, flight: Flight) -> float | None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError
+from d2rpick.base.memory import remember
 from d2rpick.flight.free_fall import Laws
 from d2rpick.flight.window import (
     FEWEST,
@@ -116,10 +117,14 @@ def _limit_to_flights_of_bodies(
 
 
 def find_bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
-    """Return the parts among ``members`` that fly separately at some time, at another velocity than the set."""
-    return momenta.known.once(
-        ("apart", *members), lambda: tuple(_search_bodies_apart(momenta, members))
-    )
+    """Return the parts among ``members`` that fly by themselves at some time, not at the set's velocity."""
+    return _collect_bodies_apart(momenta, *members)
+
+
+@remember
+def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
+    """Return the parts among ``members`` that fly by themselves."""
+    return tuple(_search_bodies_apart(momenta, members))
 
 
 def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
@@ -158,14 +163,10 @@ def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[i
             yield part
 
 
+@remember
 def _find_flights_of_part(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
-    """Return the flights of a single part, computed once."""
-    return momenta.known.once(
-        ("alone", part),
-        lambda: find_all_windows(
-            momenta.time, partial(find_flight_of, momenta, (part,))
-        ),
-    )
+    """Return the flights of one part by itself."""
+    return find_all_windows(momenta.time, partial(find_flight_of, momenta, (part,)))
 
 
 def find_flight_of(
@@ -221,16 +222,23 @@ def get_laws_of(
         whole = balance
     else:
         whole = None
-    return momenta.known.once(
-        ("laws", members, whole is None), lambda: Laws(momenta, members, whole)
-    )
+    return _make_laws(momenta, members, whole is None, whole=whole)
 
 
+@remember
+def _make_laws(
+    momenta: Momenta, members: tuple[int, ...], _: bool, *, whole: Balance | None
+) -> Laws:
+    """Return the laws of free flight for a set of parts, with the energies of the ``whole`` model, if they are used."""
+    return Laws(momenta, members, whole)
+
+
+@remember
 def _has_falling_part(momenta: Momenta) -> bool:
-    """Return True if the momentum of a single part shows that it falls under gravity."""
-    return momenta.parts is not None and momenta.known.once(
-        "falls", lambda: any(get_laws_of(momenta, (i,)).fall for i in momenta.moving)
-    )
+    """Return True if a single part is seen to fall under gravity."""
+    if momenta.parts is None:
+        return False
+    return any(get_laws_of(momenta, (i,)).fall for i in momenta.moving)
 
 
 def find_all_flights(

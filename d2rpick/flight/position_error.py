@@ -379,6 +379,19 @@ class Bodies:
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
 
+    def compute_speed_at_front(self, direction: Samples) -> float:
+        """Return what the rotation adds to the speed along a unit vector (3,) where a body is farthest along it.
+
+        Of several bodies the least counts [length/time]; 0 if a deck does not show how each of them turns.
+        """
+        turnings = [drift.turning for drift in self._known]
+        if not self._complete:
+            return 0.0
+        return min(
+            0.0 if turning is None else turning.compute_speed_at_front(direction)
+            for turning in turnings
+        )
+
     def worst(self, tr: float, td: float) -> Off | None:
         """Return the most displaced body; None outside the flight, or if an error is unknown."""
         if self._complete:

@@ -35,6 +35,8 @@ _MOST_BENT: Final = 0.05
 _STATES: Final = 2000
 # The body frame uses connected parts with this share of the body's mass, or else all parts that do not move.
 _MOST: Final = 0.5
+# The angular velocity at the end is the mean over this part of the flight, in which vibration hardly counts.
+_LAST: Final = 10
 # Parts lie on a line if a moment of inertia is below this share of the others.
 _ALONG_LINE: Final = 1e-9
 
@@ -46,7 +48,8 @@ class Turning(NamedTuple):
     become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
     ``inertia`` (n, 3, 3) belongs to those parts; ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3)
     solve the equation of psi.  ``doubt`` is the angle by which bending of the body turns its frame from one time to
-    another [rad].
+    another [rad].  ``nodes`` (k, 3) are those of the parts that become rigid at the last time, against the centre of
+    mass [length], and ``rate`` (3,) is the angular velocity there [rad/time]; both have the axes of the deck.
     """
 
     time: Samples
@@ -57,6 +60,17 @@ class Turning(NamedTuple):
     pushed: Samples
     kept: Samples
     doubt: float
+    nodes: Samples
+    rate: Samples
+
+    def compute_speed_at_front(self, direction: Samples) -> float:
+        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along it.
+
+        That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
+        one [length/time].
+        """
+        front = self.nodes[int(np.argmax(self.nodes @ direction))]
+        return float(np.cross(self.rate, front) @ direction)
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return the rotation errors psi at td of a body that is rigid from ``tr`` (k,) on, (k, 3) [rad]."""
@@ -177,7 +191,25 @@ def follow_turning(
         momenta.parts[i].id for i in body
     )  # positions of the parts according to the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
-    return Turning(time, column, arm, moving_inertia, *solved, doubt)
+    nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
+    nodes = (nodes - home + middle[-1]) @ frames[-1].T
+    return Turning(
+        time,
+        column,
+        arm,
+        moving_inertia,
+        *solved,
+        doubt,
+        nodes,
+        _compute_last_rate(time, frames),
+    )
+
+
+def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
+    """Return the mean angular velocity (3,) of frames (n, 3, 3) over the last tenth of the times (n,) [rad/time]."""
+    count = max(1, (time.size - 1) // _LAST)
+    turned = _compute_turns(frames[-count - 1 :]).sum(axis=0)
+    return np.asarray(frames[-1] @ turned / (time[-1] - time[-count - 1]))
 
 
 def _choose_frame_parts(

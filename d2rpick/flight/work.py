@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, find_lasting_window
 from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
@@ -155,6 +156,16 @@ def compute_change_of_balance(
     )
 
 
+@remember
+def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
+    """Return the laws of the energies in free flight, without and with a vibration of the internal energy."""
+    terms = np.stack(_list_terms(balance), axis=1)
+    return (
+        _Parabola(balance.time, terms, balance.kinetic, None),
+        _Parabola(balance.time, terms, balance.kinetic, balance.internal),
+    )
+
+
 def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which only gravity and damping change the energy; else None.
 
@@ -179,14 +190,8 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # the second law also fits a rate, which would hide a load, so the first law is tried first
-    exact, ringing = balance.known.once(
-        "work",
-        lambda: [
-            _Parabola(time, np.stack(terms, axis=1), balance.kinetic, of)
-            for of in (None, balance.internal)
-        ],
-    )
+    # the second law also allows a rate, which would hide a load, so the first one is tried first
+    exact, ringing = _make_laws_of_work(balance)
     window = find_lasting_window(exact, td, extent, noise)
     if window is None:
         rings = find_lasting_window(ringing, td, extent, noise, rings=True)
@@ -392,6 +397,13 @@ def has_visible_contacts(balance: Balance) -> bool:
     return float(np.ptp(energy)) > _VISIBLE * balance.precision.noise(energy)
 
 
+@remember
+def _make_law_of_contacts(balance: Balance) -> Constant:
+    """Return the law that the contact energy stays as it is."""
+    assert balance.sliding is not None
+    return Constant(balance.time, balance.sliding[:, np.newaxis])
+
+
 def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which the contact energy is constant, or None.
 
@@ -402,7 +414,7 @@ def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
     energy = balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:
         return None
-    law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))
+    law = _make_law_of_contacts(balance)
     states = find_lasting_window(
         law, td, float(np.ptp(energy)), balance.precision.noise(energy)
     )

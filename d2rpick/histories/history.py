@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import HistoryError, RangeError
+from d2rpick.base.memory import Memory, remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import format_distinctly
 from d2rpick.histories.samples import find_turns, find_window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 # in quotes, because importing numpy.typing slows the start
 Samples: TypeAlias = "NDArray[np.float64]"
-_Found = TypeVar("_Found")
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
 # Squares of larger energies overflow a double; no system of units has such energies.
@@ -82,23 +82,6 @@ class Precision(NamedTuple):
 EXACT = Precision()
 
 
-class Memory:
-    """Cache of results computed for a record."""
-
-    def __init__(self) -> None:
-        self._found: dict[Hashable, Any] = {}
-
-    def once(self, key: Hashable, make: Callable[[], _Found]) -> _Found:
-        """Return the result stored under ``key``; compute it with ``make`` at the first request."""
-        if key not in self._found:
-            self._found[key] = make()
-        result: _Found = self._found[key]
-        return result
-
-    def __reduce__(self) -> tuple[type[Memory], tuple[()]]:
-        return type(self), ()  # a copy in another process starts empty
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
     """Momenta of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); the whole model if ``parts`` is None.
@@ -106,7 +89,7 @@ class Momenta:
     ``precision`` is the one of the printed numbers. ``chosen`` are the indices of the parts to switch, ``flying``
     those of the parts known to fly together, if any. ``masses`` has shape (parts,), NaN if unknown; None if no mass
     is known [mass]. ``velocity`` is True if the values are velocities, of an unknown mass. ``surroundings`` are the
-    forces from outside. ``known`` stores results for sets of parts, since the same few sets are requested often.
+    forces from outside. ``memory`` keeps results for sets of parts, since the same few sets are requested often.
     """
 
     time: Samples
@@ -118,21 +101,19 @@ class Momenta:
     masses: Samples | None = None
     velocity: bool = False
     surroundings: Surroundings = UNKNOWN
-    known: Memory = field(default_factory=Memory, init=False)
+    memory: Memory = field(default_factory=Memory, init=False)
 
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
         """Return the same momenta with other parts to switch; stored results are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
-        object.__setattr__(copy, "known", self.known)
+        object.__setattr__(copy, "memory", self.memory)
         return copy
 
     def of(self, members: Sequence[int]) -> Samples:
         """Return the sum over the parts with these indices, shape (n, 3), read-only."""
-        return self.known.once(
-            ("sum", *members), lambda: freeze(self.values[:, list(members)].sum(axis=1))
-        )
+        return _sum_momenta(self, *members)
 
     def noise(self, members: Sequence[int]) -> float:
         """Return the rounding error of the sum of these printed momenta [momentum]."""
@@ -181,6 +162,12 @@ class Track(NamedTuple):
     values: Samples
 
 
+@remember
+def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
+    """Return the sum of the momenta of some parts, read-only, shape (n, 3)."""
+    return freeze(momenta.values[:, list(members)].sum(axis=1))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for terms that the files do not contain.
@@ -209,7 +196,7 @@ class Balance:
     velocity: Samples | None = None
     hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
     precision: Precision = EXACT
-    known: Memory = field(default_factory=Memory, init=False)
+    memory: Memory = field(default_factory=Memory, init=False)
 
     @cached_property
     def kinetic_and_internal(self) -> Samples | None:
@@ -297,7 +284,7 @@ class History:
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
     energy_format: str = ""
-    known: Memory = field(default_factory=Memory, init=False)
+    memory: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
         time = freeze(self.time)

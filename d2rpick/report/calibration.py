@@ -22,11 +22,11 @@ _LEG: Final = row(
 )
 DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in us per cycle.", row(
     keys.WARNINGS,
-    Field("element_share", "number", "share of the elements in a deformable step",
+    Field("element_share", "number", "fraction of a time step of the deformable model that is spent on elements",
           lambda ours: ours.weights.element_share),
     Field("rigid_node", "number", "cost of a node of a rigid body", lambda ours: ours.weights.rigid_node),
     Field("per_element", each("number"), "cost of an element by formulation", lambda ours: ours.weights.per_element),
-    Field("told", "texts", "what the legs decide; the others keep the measured ratio"),
+    Field("told", "texts", "costs that these runs determine; the other costs keep the built-in ratio"),
     Field("misfit", "number"),
     Field("legs", many(_LEG)),
 ), closed=True)  # fmt: skip

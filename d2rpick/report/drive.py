@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 _WINDOW: Final = row(
-    Field("free", "number", "since when no force has acted"),
-    Field("wait", "number", "time without force that was asked for"),
+    Field("free", "number", "time from which no force acts"),
+    Field("wait", "number", "force-free time"),
     Field("tr", "number"), Field("td", "number"),
-    Field("contact", "number?", "first contact of the rigid body; null where the run ended before"),
-    Field("reason", "text?", "why the flight was left out, deformable from tr to td; null where it was switched"),
+    Field("contact", "number?", "first contact of the rigid body; null if the run ended before a contact"),
+    Field("reason", "text?", "reason why the parts were not switched in this flight; null if they were"),
 )  # fmt: skip
 _LEG: Final = row(
     Field("kind", "text", "load, probe or rigid"),
@@ -27,9 +27,11 @@ _LEG: Final = row(
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
-    Field("legs", many(_LEG), "in the order they were computed, with those that were thrown away"),
-    Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda answer: answer.saved[0]),
-    Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda answer: answer.saved[1]),
+    Field("legs", many(_LEG), "engine runs in the order of computation, including the discarded ones"),
+    Field("saved_by_model", "number?", "saved fraction of the CPU time of a deformable run, by the cost model",
+          lambda answer: answer.saved[0]),
+    Field("saved_by_time", "number?", "saved fraction according to the CPU times of the engine runs",
+          lambda answer: answer.saved[1]),
 ))  # fmt: skip
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 

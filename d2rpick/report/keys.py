@@ -36,26 +36,26 @@ PAIR: Final = row(
 WINDOW: Final = row(
     Field("start", "number"),
     Field("end", "number"),
-    Field("share", "number", "of the flight up to td"),
+    Field("share", "number", "length as a fraction of the flight up to td"),
 )
 
 WEIGHTS: Final = (
-    Field("source", "text", "where they come from, in words"),
-    Field("file", "text?", "the file of --weights; null where they were not read from one",
+    Field("source", "text", "source of the costs, as text"),
+    Field("file", "text?", "file of --weights; null if the costs are not from a file",
           lambda weights: weights.file.name if weights.file else None),
-    Field("sha256", "text?", "of that file", lambda weights: weights.file.sha256() if weights.file else None),
+    Field("sha256", "text?", "SHA-256 of this file", lambda weights: weights.file.sha256() if weights.file else None),
 )  # fmt: skip
 HISTORY: Final = row(
     Field("source", get_kind("texts", minItems=1)),
-    Field("sha256", many(get_kind("text", pattern="^[0-9a-f]{64}$")), "of each source, in its order",
+    Field("sha256", many(get_kind("text", pattern="^[0-9a-f]{64}$")), "SHA-256 of each source, in the same order",
           lambda history: [file.sha256() for file in history.files]),
     Field("format", "text"),
-    Field("channel", "text", "what was taken for the internal energy"),
-    Field("parts", maybe(many(PART)), "whose energies were added, null for the whole model or columns"),
+    Field("channel", "text", "channel that is used as internal energy"),
+    Field("parts", maybe(many(PART)), "parts whose energies were added; null for the whole model, or for columns"),
     Field("states", get_kind("integer", minimum=3), get=lambda history: int(history.time.size)),
     Field("time_start", "number", get=lambda history: float(history.time[0])),
     Field("time_end", "number", get=lambda history: float(history.time[-1])),
-    Field("complete", "flag", "false when the input ends within a state"),
+    Field("complete", "flag", "false if the file ends within a state"),
     Field("notes", "texts"),
     name="history",
 )  # fmt: skip
@@ -70,24 +70,24 @@ _SOURCE: Final = one_of(
 )
 FLIGHT: Final = row(
     Field("start", "number?"),
-    Field("end", "number?", "next contact, null when none was seen"),
+    Field("end", "number?", "time of the next contact; null if none was found"),
     Field("source", maybe(_SOURCE)),
     Field(
         "certain",
         "flag",
-        "false where the level of the energy alone shows it, or nothing",
+        "true if the evidence excludes contacts and loads",
     ),
     Field(
         "parts",
         maybe(many(PART)),
-        "seen to fly together, null for the whole model or where momentum did not tell",
+        "parts that fly together; null for the whole model, or if the momentum does not show them",
     ),
     name="flight",
 )
 OSCILLATOR: Final = row(
     Field("omega", "number?"), Field("alpha", "number?"), Field("energy_plastic", "number?"),
-    Field("preload", "number?", "square root of energy"),
-    Field("misfit", "number?", "rms(E - fit)/std(E) over the fitted window"),
+    Field("preload", "number?", "preload as the square root of an energy"),
+    Field("misfit", "number?", "rms(E - fit)/std(E) in the fitted interval"),
     Field("source", one_of("identified", "given")),
     Field("describes_record", "flag"),
     Field("reason", "text?"),
@@ -96,17 +96,17 @@ OSCILLATOR: Final = row(
 # position of the rigid body at td, estimated from single parts
 _POSITION: Final = (
     Field("position_error", "size?",
-          "how far a rigid body will be out of place at td since a part is frozen elsewhere, the largest of several "
-          "bodies [length]; 0 where each is a single part, in which nothing is seen to move; null where unknown"),
-    Field("position_error_part", "text?", "title of the part that causes it; null where nothing is frozen elsewhere"),
+          "position error of a rigid body at td, caused by a part that is frozen in another position [length]; for "
+          "several bodies, the largest error; 0 if each body is a single part; null if unknown"),
+    Field("position_error_part", "text?", "title of the part that causes the position error; null if there is none"),
     Field("position_error_body", "text?",
-          "numbers of the parts of the rigid body that is off, as --part takes them, where the deck tells several; "
-          "else null"),
+          "part numbers of the displaced rigid body, in the form of --part, if the deck defines several bodies; "
+          "otherwise null"),
     Field("position_error_assumes", "text?",
-          "what is taken for granted since no deck tells which parts become one rigid body; null with a deck"),
+          "assumption about the rigid bodies, because there is no deck; null with a deck"),
     Field("position_error_is_lower_bound", "flag?",
-          "whether the body may be further off: inner motion that is slower than the flight, or that bends the body, "
-          "passes for its rotation; null where nothing is known", later=True),
+          "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
+          "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
 # Values of a candidate besides its parts; in CSV the notes come last. Add a new measure at the end.
 CANDIDATE: Final = row(
@@ -116,7 +116,7 @@ CANDIDATE: Final = row(
     Field("energy", "number"),
     Field("level_ratio", "number?", "E(tr)/E(td)"),
     Field("level_error", "size?"),
-    Field("rising", "flag?", "null at an extremum"),
+    Field("rising", "flag?", "true if the energy increases at tr; null at an extremum"),
     Field("sign_match", "flag?"),
     Field("lock_in_error", "size?"),
     Field("residual", "size?"),
@@ -132,19 +132,19 @@ CANDIDATE: Final = row(
     Field(
         "run_time_share",
         "size?",
-        "expected run time over that of the reference, with --cost-share",
+        "estimated CPU time relative to the reference run",
     ),
     Field(
         "same_swing",
         "flag",
-        "the energy turns less than twice from tr to td: hardly anything is saved",
+        "true if the energy has fewer than two extrema between tr and td, so that the saving is small",
     ),
-    Field("residual_high", "size?", "the highest residual that the record allows"),
+    Field("residual_high", "size?", "upper bound of the residual"),
     *_POSITION,
     Field(
         "residual_low",
         "size?",
-        "the lowest residual that the record allows",
+        "lower bound of the residual",
         later=True,
     ),
 )
@@ -185,7 +185,7 @@ LATER: Final = (
 MATCHES: Final = Field("parts", many(row(
     Field("name", "text"),
     Field("sign_match", "flag?"),
-    Field("share", maybe(SHARE), "in the square of the part mismatch"),
+    Field("share", maybe(SHARE), "contribution of the part to the square of the part mismatch"),
     Field("reason", "text?"),
     name="part_match",
 )))  # fmt: skip
@@ -193,13 +193,13 @@ GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
 # values of the decision on a pair
 DECIDED: Final = row(
-    Field("verdict", VERDICT, "what to do with the pair, by its grade"),
-    Field("verdict_reason", "text", "why, in words", lambda decision: decision.reason),
-    Field("cure", "text", "what would make it better, in words; empty for a good pair"),
-    Field("expected_after_td", "text", "what is expected after td, in words", lambda decision: decision.expected),
-    Field("worst_case", "text", "the worst that the record allows after td, in words"),
+    Field("verdict", VERDICT, "what to do with the pair"),
+    Field("verdict_reason", "text", "reason for the verdict, as text", lambda decision: decision.reason),
+    Field("cure", "text", "how to improve the pair, as text; empty for a good pair"),
+    Field("expected_after_td", "text", "expected result after td, as text", lambda decision: decision.expected),
+    Field("worst_case", "text", "worst possible result after td, as text"),
     Field("worst_residual", get_kind("number", minimum=0),
-          "the largest residual that the record allows; 2 if nothing is known of it"),
+          "worst possible residual; 2 if the residual is unknown"),
 )  # fmt: skip
 # the same values for a result whose decision may be None
 DECISION: Final = tuple(
@@ -209,60 +209,66 @@ DECISION: Final = tuple(
 GRADE_OF_PAIR: Final = Field(
     "quality",
     GRADE,
-    "of the pair, as in verdict; null without one",
+    "grade of the pair; null if there is no pair",
     lambda answer: answer.decision and answer.decision.grade,
 )
 QUALITY: Final = (
     *DECISION,
     GRADE_OF_PAIR,
-    Field("quality_reasons", "texts?", "why it is none better",
+    Field("quality_reasons", "texts?", "reasons why the grade is not better",
           lambda answer: answer.quality and answer.quality.reasons),
-    Field("motion", GRADE, "grade of the motion: will the parts fly and land as without switching",
+    Field("motion", GRADE, "grade of the motion: will the parts fly and land as in the reference run?",
           lambda answer: answer.quality and answer.quality.motion.grade, later=True),
-    Field("motion_reasons", "texts?", "why it is none better",
+    Field("motion_reasons", "texts?", "reasons why the grade is not better",
           lambda answer: answer.quality and answer.quality.motion.reasons, later=True),
-    Field("vibration", GRADE, "grade of the vibration after td, by what its error is worth in the next contact",
+    Field("vibration", GRADE, "grade of the vibration after td, which takes the energy of the next contact into "
+                              "account",
           lambda answer: answer.quality and answer.quality.vibration.grade, later=True),
     Field("vibration_alone", GRADE, "grade of the vibration by itself",
           lambda answer: answer.quality and answer.quality.alone.grade, later=True),
-    Field("vibration_reasons", "texts?", "why that is none better",
+    Field("vibration_reasons", "texts?", "reasons why the grade of the vibration is not better",
           lambda answer: answer.quality and answer.quality.alone.reasons, later=True),
     Field("vibration_worth", "size?",
-          "energy of the error of the vibration over that which the next contact puts into the parts, at most; null "
-          "where that is not known",
+          "upper bound of (energy of the vibration error) / (energy of the next contact); null if unknown",
           lambda answer: answer.quality and answer.quality.worth and answer.quality.worth.share, later=True),
-    Field("mean_energy_low", "size?", "least mean energy after td that is expected, over the reference's",
+    Field("mean_energy_low", "size?", "lower bound of the mean energy after td, divided by the mean energy of the "
+                                      "reference run",
           lambda answer: answer.kept and answer.kept.low, later=True),
-    Field("mean_energy_high", "size?", "largest mean energy after td that is expected, over the reference's",
+    Field("mean_energy_high", "size?", "upper bound of the mean energy after td, divided by the mean energy of the "
+                                       "reference run",
           lambda answer: answer.kept and answer.kept.high, later=True),
 )  # fmt: skip
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),
-    Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: what does not vibrate"),
+    Field("resting_energy", get_kind("number", minimum=0), "lowest energy in the flight: the static energy"),
     Field("kinetic_share", SHARE),
-    Field("ratio", "size?", "mean energy after td over the reference's, for the recommended tr"),
-    Field("ratio_low", "size?", "the same if nothing is at rest"),
-    Field("ratio_at_level", "number", "the same for a tr with the energy of td"),
-)), "estimates on basis energy, for a vibration of many modes")  # fmt: skip
+    Field("ratio", "size?", "mean energy after td divided by the mean energy of the reference run, for the "
+                            "recommended tr"),
+    Field("ratio_low", "size?", "the same ratio, without static energy"),
+    Field("ratio_at_level", "number", "the same ratio, for a tr with the energy of td"),
+)), "estimates for a vibration of many modes, if the basis is energy")  # fmt: skip
 HEALTH: Final = Field("health", maybe(row(
     Field("hourglass_share", "size?"),
-    Field("part_hourglass_share", "size?", "of part, the worst of those to be switched"),
+    Field("part_hourglass_share", "size?", "hourglass energy of the worst of the chosen parts, relative to the peak "
+                                           "internal energy of this part"),
     Field("part", maybe(row(*PART.fields))),
-    Field("energy_ratio_min", "number?", "total energy over initial energy and external work"),
+    Field("energy_ratio_min", "number?", "total energy divided by initial energy and external work"),
     Field("energy_ratio_max", "number?"),
-    Field("sliding_share", "size?", "energy of contacts, without friction where that is told apart"),
+    Field("sliding_share", "size?", "contact energy, without friction energy if the file lists it separately"),
     Field("negative_sliding_share", "size?"),
     Field("eroded_share", "size?"),
     Field("window", "span?"),
-    Field("window_sliding", "size?", "change in the window, as a share of the mean energy of the chosen parts there"),
-    Field("window_work", "size?", "external work beyond gravity and damping"),
+    Field("window_sliding", "size?", "change of the contact energy in the window, relative to the mean energy of the "
+                                     "chosen parts in the window"),
+    Field("window_work", "size?", "external work in the window beyond gravity and damping, relative to the mean "
+                                  "energy of the chosen parts in the window"),
     Field("window_eroded", "size?"),
     Field("reason", "text?"),
-    Field("window_reason", "text?", "why the work in the window is not judged"),
-    Field("until", "number?", "the run was judged up to here: td, or its end in info"),
+    Field("window_reason", "text?", "reason why the work in the window is not judged"),
+    Field("until", "number?", "time up to which the run was checked: td, or the end of the run for info"),
     name="health", later=("part_hourglass_share", "part", "until"),
-)), "of the reference run up to td; shares of the peak internal energy of the model, null for what the files do not "
-    "have")  # fmt: skip
+)), "health of the reference run up to td; energies relative to the peak internal energy of the model, null if the "
+    "files do not contain them")  # fmt: skip
 
 
 class Read(Protocol):
@@ -311,11 +317,11 @@ FRAME: Final = (
     WARNINGS,
     Field("history", HISTORY, get=lambda answer: _get_history_holder(answer).history),
     Field("deck", maybe(row(*FILES, closed=True)),
-          "the files of the deck that the answer rests on, the main file first; null without --deck, and where "
-          "nothing of it is used",
+          "files of the deck that the answer is based on, main file first; null without --deck, or if nothing in the "
+          "deck is used",
           lambda answer: _get_history_holder(answer).settings.by_deck),
     Field("weights", maybe(row(*WEIGHTS, closed=True)),
-          "the cost of elements that the run time rests on; null where it does not rest on any", _get_weights),
+          "element costs that the estimate of the CPU time uses; null if it uses none", _get_weights),
 )  # fmt: skip
 
 
@@ -345,14 +351,14 @@ MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),
     Field("kinetic_share_estimated", "flag",
-          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
+          "true if kinetic_share comes from the modes of each part or from counted cycles, not from an oscillator",
           lambda now: now.vibration.estimated is not None),
     Field("basis", BASIS),
-    Field("flight", FLIGHT, "window of free flight"),
+    Field("flight", FLIGHT, "free flight"),
     Field("oscillator", maybe(OSCILLATOR), get=_get_oscillator),
     Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "those that basis modal was identified from, by their rates; null on any other basis", _get_modes),
+          "modes of basis modal, sorted by rate; null for other bases", _get_modes),
     Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
-          "parts whose deformation has no sign; null where energies of single parts are not known",
+          "parts whose deformation has an unknown direction; null if the energies of parts are unknown",
           lambda now: now.evidence.parts and now.evidence.parts.unsigned),
 )  # fmt: skip

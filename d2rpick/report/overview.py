@@ -29,9 +29,9 @@ _EVIDENCE: Final = one_of(
 )
 _FLIGHT: Final = row(
     Field("start", "number", get=lambda flight: flight[1].start),
-    Field("end", "number?", "null where the record ends in flight",
+    Field("end", "number?", "end of the flight; null if the record ends in flight",
           lambda flight: flight[1].end if flight[1].end_seen else None),
-    Field("parts", maybe(many(keys.PART)), "that fly together, null for the whole model",
+    Field("parts", maybe(many(keys.PART)), "parts that fly together; null for the whole model",
           lambda flight: flight[1].parts or None),
     Field("source", _EVIDENCE, get=lambda flight: flight[0]),
 )  # fmt: skip
@@ -43,13 +43,21 @@ _FORCE: Final = row(
     Field(
         "name",
         "text",
-        "of a contact, an interface or a rigid wall, or of a column of forces",
+        "name of a contact, interface, rigid wall, or column of forces",
     ),
-    Field("acts", many(_TIMES), "times in which it acts, to one output interval"),
+    Field(
+        "acts",
+        many(_TIMES),
+        "intervals in which the force acts, accurate to one output interval",
+    ),
 )
 _PART: Final = row(
     *keys.PART.of_part(lambda overview_part: overview_part.part),
-    Field("energy_max", "number?", "null where not written in every state"),
+    Field(
+        "energy_max",
+        "number?",
+        "highest internal energy; null if some state lacks the value",
+    ),
 )
 _SAMPLING: Final = row(
     *(
@@ -60,26 +68,27 @@ _SAMPLING: Final = row(
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
     Field("source", get_kind("texts", minItems=1)),
-    Field("format", "text", "formats of companions joined by ' + '"),
-    Field("version", "text", "of the solver, empty where no file names it"),
+    Field("format", "text", "format; the formats of companion files are joined by ' + '"),
+    Field("version", "text", "version of the solver; empty if no file contains it"),
     Field("title", "text"),
     Field("states", maybe(get_kind("integer", minimum=0)),
-          "null where several columns may be the time; then, and at 0, the times are null"),
+          "number of states; null if several columns may be the time. In this case, and for 0 states, the times are "
+          "null"),
     Field("time_start", "number?"), Field("time_end", "number?"),
-    Field("time_unit", "text", "empty where no file names it"),
+    Field("time_unit", "text", "empty if no file contains it"),
     Field("sampling", maybe(_SAMPLING),
-          "output intervals, null with a single state"),
-    Field("complete", "flag", "false when the input ends within a state"),
+          "output intervals; null for a single state"),
+    Field("complete", "flag", "false if the file ends within a state"),
     Field("channels", "texts"),
     Field("parts", many(_PART)),
-    Field("flights", many(_FLIGHT), "windows of free flight, by the best evidence that the files hold"),
+    Field("flights", many(_FLIGHT), "free flights, found from the best evidence in the files"),
     Field("should_write", "text?",
-          "output of the solver that would show the flights for sure, null where the files have it"),
+          "output to request so that the flights are certain; null if the files contain it"),
     keys.HEALTH,
     Field("notes", "texts"),
-    Field("verdict", keys.VERDICT, "whether to choose switch times by this run", later=True),
-    Field("verdict_reason", "text", "why, in words", lambda overview: overview.reason, later=True),
-    Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are written", later=True),
+    Field("verdict", keys.VERDICT, "whether this run is suitable for choosing switch times", later=True),
+    Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
+    Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
 ))  # fmt: skip
 _MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
 _PARTS_HEAD = ("part", "title", "highest internal energy")

@@ -65,41 +65,48 @@ WINDOW: Final = row(
     Field(
         "flight",
         get_kind("integer", minimum=1),
-        "number of the flight in the record, from 1",
+        "number of the flight in the record, starting at 1",
         lambda row: row.number,
     ),
     Field("flight_start", "number", get=lambda row: row.start),
     Field(
         "flight_end",
         "number?",
-        "the contact that ends it, null where the record ends in flight",
+        "time of the contact that ends the flight; null if the record ends in flight",
         lambda row: row.flight.end,
     ),
-    Field("flight_source", "text?", "what shows it", lambda row: row.flight.source),
+    Field(
+        "flight_source",
+        "text?",
+        "evidence for the flight",
+        lambda row: row.flight.source,
+    ),
     Field(
         "certain",
         "flag",
-        "whether more than the level of the energy shows it",
+        "true if the evidence for the flight excludes contacts and loads",
         lambda row: row.flight.certain,
     ),
     Field("status", one_of("supported", "re-plan", "done", "left-out")),
     Field(
         "reason",
         "text?",
-        "why it is not supported, or what became of a window that is done",
+        "reason why the window is not supported; for a window that is done, what happened after it",
     ),
     Field("tr", "number?", get=lambda row: _get_time(row, 0)),
     Field("td", "number?", get=lambda row: _get_time(row, 1)),
     Field("rigid_time", "number?"),
-    Field("rigid_fraction", "number?", "of the record"),
+    Field(
+        "rigid_fraction", "number?", "rigid time as a fraction of the simulated time"
+    ),
     _BEST.field("run_time_share")._replace(
         kind="number?",
-        meaning="of the reference, with this window alone; null without a cost share",
+        meaning="CPU time relative to the reference run, with this window alone; null if the cost is unknown",
     ),
     Field(
         "locks_in",
         "flag?",
-        "whether the window locks in energy, so that landings after it move",
+        "true if the window freezes vibration energy, so that later landings shift",
     ),
     Field(
         "basis",
@@ -119,36 +126,36 @@ WINDOW: Final = row(
     Field(
         "margin",
         "number?",
-        "kept clear before the contact, null for a window that is done",
+        "margin before the contact; null for a window that is done",
         _make_margin_getter("time"),
     ),
     Field(
         "margin_source",
         maybe(one_of("given", "flight", "landing", "grazing", "no-contact")),
-        "given, 3 % of the flight, how far a switch may move the landing, or that of a grazing contact",
+        "source of the margin: given, 3 % of the flight, the shift that a switch may cause, or a grazing contact",
         _make_margin_getter("source"),
     ),
     Field(
         "landing_spread",
         "number?",
-        "how far a switch may move the landing, null where the files do not tell",
+        "time by which a switch may shift the landing; null if unknown",
         _make_margin_getter("spread"),
     ),
     Field(
         "landing",
         "number?",
-        "of a window that is done",
+        "landing after a window that is done",
         lambda row: row.done and row.done.landing,
     ),
     Field(
         "landing_planned",
         "number?",
-        "in the run that it was planned from",
+        "landing in the run from which the window was planned",
         lambda row: row.done and row.done.planned,
     ),
     *(_BEST.field(key) for key in _POSITION),
     keys.GRADE_OF_PAIR._replace(
-        meaning="of the pair; null without one, and for a window that is done"
+        meaning="grade of the pair; null if there is no pair, or if the window is done"
     ),
     _BEST.field("position_error_is_lower_bound"),
     *keys.DECISION,
@@ -159,19 +166,25 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick plan; times in the unit of the history.",
     row(
         *keys.FRAME,
-        Field("min_rigid", "number", "shorter windows are left out"),
+        Field("min_rigid", "number", "minimum length of a window"),
         Field(
             "windows",
             many(WINDOW),
-            "a row per flight, in the order of time",
+            "one entry for each flight, in the order of time",
             lambda plan: plan.flights,
         ),
-        Field("rigid_time", "number", "of all supported windows"),
-        Field("rigid_fraction", "number", "of the record, with all supported windows"),
+        Field(
+            "rigid_time", "number", "sum of the rigid times of all supported windows"
+        ),
+        Field(
+            "rigid_fraction",
+            "number",
+            "fraction of the simulated time that is rigid with all supported windows",
+        ),
         Field(
             "run_time_share",
             "number?",
-            "of the reference, with all supported windows; null without a cost share",
+            "CPU time relative to the reference run, with all supported windows; null if the cost is unknown",
         ),
     ),
 )

@@ -35,19 +35,19 @@ RUN: Final = row(
 )
 DOCUMENT: Final = Document(
     "d2rpick/rollover/1",
-    "Switched runs of the rollover box against the one without switching; SI units, roll_error in degrees.",
+    "Switched runs of the rollover box, compared with the reference run; SI units, roll_error in degrees.",
     row(
         keys.WARNINGS,
         Field(
             "released",
             "number?",
-            "the sled pushed last",
+            "time of the last sled force",
             lambda scan: scan.reference.released,
         ),
         Field(
             "landed",
             "number?",
-            "the ground pushed first; null where the run ends before",
+            "time of the first ground force; null if the run ends earlier",
             lambda scan: scan.reference.landed,
         ),
         Field("td", "number", get=lambda scan: scan.answer.situation.td),
@@ -61,7 +61,7 @@ DOCUMENT: Final = Document(
         Field(
             "recommended",
             "number?",
-            "the tr that suggest recommends",
+            "tr that suggest recommends",
             lambda scan: _get_recommended_tr(scan.answer),
         ),
         Field("runs", many(RUN), get=lambda scan: scan.outcomes),

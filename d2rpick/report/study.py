@@ -58,17 +58,17 @@ PLAIN: Final = row(
     Field("basis", maybe(keys.BASIS)),
     Field("warnings", "texts"),
     Field("time_unit", "text"),
-    Field("td", "number?", "when this run is switched back"),
-    Field("record_end", "number?", "last time of its record"),
-    Field("quality", keys.GRADE, "of its pair; null without one", later=True),
-    Field("verdict", maybe(keys.VERDICT), "what to do with its pair", later=True),
-    Field("verdict_reason", "text?", "why, in words", later=True),
-    Field("cure", "text?", "what would make it better; empty for a good pair", later=True),
+    Field("td", "number?", "td of this run"),
+    Field("record_end", "number?", "last time of the record"),
+    Field("quality", keys.GRADE, "grade of the pair; null if there is no pair", later=True),
+    Field("verdict", maybe(keys.VERDICT), "what to do with the pair of this run", later=True),
+    Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
+    Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
-    "error at the common tr: the residual, on basis energy the level error, 0 where nothing vibrates; in -f ndjson "
-    "common_errors of the last line",
+    "error at the common tr: the residual, or the level error if the basis is energy; 0 if nothing vibrates; with -f "
+    "ndjson see common_errors in the last line",
     lambda run_and_error: run_and_error[1],
 )  # fmt: skip
 # A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
@@ -80,23 +80,28 @@ _RUN: Final = row(
 )
 _SHARED: Final = row(
     keys.WARNINGS,
-    Field("td", "number?", "null where each run has its own"),
-    Field("td_window", "span?", "where each run chose its td"),
-    Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))), "Of the runs that have one.",
+    Field("td", "number?", "given td; null if each run has its own td"),
+    Field("td_window", "span?", "range in which each run chose its td"),
+    Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))),
+          "Statistics of tr, for the runs that have one.",
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
-    Field("agree", "flag?", "Whether the intervals tr_low to tr_high of these runs have a time in common."),
+    Field("agree", "flag?", "True if the intervals from tr_low to tr_high of these runs have a time in common."),
     Field("common_tr", "number?",
-          "The tr of all runs where they agree, else the earliest that is acceptable in every run of status ok or none "
-          "and within the timing tolerance of each, where there is one.", lambda answer: answer.common.tr),
+          "The tr of all runs if they agree. Otherwise the earliest tr that is acceptable in every run with status ok "
+          "or none, and within the timing tolerance of each, if there is one.", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
-          "What to do with common_tr, by the worst run: its own pair, and its error at this tr.",
+          "What to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
+          "common_tr.",
           lambda answer: VERDICTS.get(answer.grade), later=True),
-    Field("common_window", "span?", "First and last tr around it that are.", lambda answer: answer.common.window),
+    Field("common_window", "span?", "First and last tr around common_tr that meet the same conditions.",
+          lambda answer: answer.common.window),
     Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
     Field("common_keeps_timing_tolerance", "flag?",
-          "Whether no error at common_tr is more than 0.05 above that at the tr of the run; null without common_tr.",
+          "True if no error at common_tr is more than 0.05 larger than the error at the run's own tr; null if there "
+          "is no common_tr.",
           lambda answer: answer.common.keeps_tolerance),
-    Field("common_errors", many("number?"), "Errors of the runs at common_tr, in their order; empty without it.",
+    Field("common_errors", many("number?"), "Errors of the runs at common_tr, in the same order; empty if there is no "
+                                            "common_tr.",
           lambda answer: answer.common.errors),
 )  # fmt: skip
 _RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(add_errors(answer)))

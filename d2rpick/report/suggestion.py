@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 # largest number of windows of acceptable tr that a line names
 _NAMED = 4
 _WINDOW: Final = row(
-    *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
+    *keys.WINDOW.fields,
+    Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
 # a candidate and the decision on it
 CANDIDATE: Final = row(
@@ -74,19 +75,20 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     *keys.FRAME,
     Field("td", "number"),
     Field("td_window", "span?",
-          "where td was chosen: --td-window, or the longest flight; null where it was given"),
+          "range in which td was chosen: --td-window, or the longest flight; null if td was given"),
     Field("longer_pair", maybe(keys.PAIR),
-          "the longest acceptable pair in td_window, where much rigid time was given up for quality",
+          "longest acceptable pair in td_window, if it is much longer than the recommended pair but of lower quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     Field("candidates", many(CANDIDATE), get=_add_decisions),
     Field("acceptable_windows", maybe(many(_WINDOW)),
-          "on basis energy: windows in which every tr is acceptable, null on another basis", _list_acceptable_windows),
+          "admissible tr ranges, if the basis is energy; otherwise null", _list_acceptable_windows),
     Field("recommended", maybe(keys.TIMES)),
     *keys.QUALITY,
     keys.HEALTH,
     keys.EXPECTED,
-    Field("better_td", maybe(keys.PAIR), "null where there is none, or it is the recommended one",
+    Field("better_td", maybe(keys.PAIR), "pair at a better td; null if there is none, or if it is the recommended "
+                                         "pair",
           lambda answer: answer.better_pair),
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),

@@ -19,22 +19,23 @@ if TYPE_CHECKING:
 
 OFFER: Final = row(
     Field("td", "number"),
-    Field("peak", "flag", "the energy peaks at td"),
-    Field("tr", "number?", "the tr that suggest recommends for td; null where it recommends none"),
+    Field("peak", "flag", "true if the energy has a peak at td"),
+    Field("tr", "number?", "tr that suggest recommends for td; null if there is none"),
     Field("error", "size?",
-          "what offers are compared by: the residual; on basis energy 1 - sqrt(E(td) / (2 mean E)), null above "
-          "2 mean E"),
+          "error by which the values of td are compared: the residual; if the basis is energy, 1 - sqrt(E(td) / (2 "
+          "mean E)), or null if E(td) is above 2 mean E"),
     Field("unbeaten", "flag",
-          "no other offer has less error and as much rigid time, or more rigid time and no more error"),
-    Field("recommended", "flag", "the pair of suggest where td is chosen too"),
+          "true if the pair is Pareto-optimal: no other td has a smaller error with at least the same rigid time, or "
+          "a longer rigid time with at most the same error"),
+    Field("recommended", "flag", "true for the pair that suggest recommends if td is not given"),
     *keys.QUALITY,
     Field("basis", keys.BASIS),
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(keys.SHARE)),
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
-    Field("reason", "text?", "why no tr is recommended", lambda offer: offer.answer.why_none or None),
-    Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
+    Field("reason", "text?", "reason why no tr is recommended", lambda offer: offer.answer.why_none or None),
+    Field("acceptable_windows", maybe(many(keys.WINDOW)), "admissible tr ranges, if the basis is energy",
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
@@ -150,20 +151,21 @@ def give_answer(trade_off: TradeOff) -> str:
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", "number?", "the td that was asked for", lambda trade_off: trade_off.asked and trade_off.asked.td),
+    Field("td", "number?", "given td", lambda trade_off: trade_off.asked and trade_off.asked.td),
     Field("td_window", "span",
-          "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
+          "range in which td was explored: the given range, or the longest flight up to the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
-    Field("answer", "text", "the shortest sensible answer", give_answer),
+    Field("answer", "text", "summary of the answer in one sentence", give_answer),
     Field("recommended", maybe(keys.TIMES)),
     Field("start", "number?",
-          "td of the offer that the answer starts from: the one asked for, else the one that saves most",
+          "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
+          "nearest Pareto-optimal td with at most half of the error at start; otherwise the recommended td if its "
+          "error is smaller",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
-          "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
+          "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),
 ))  # fmt: skip
 
 

@@ -31,21 +31,22 @@ MEASURES: Final = row(
     Field(
         "verified",
         "flag",
-        "admissible, not poor, and with a residual of at most 0.5; verdict says what to do",
+        "true if the pair is admissible, not poor, and has a residual of at most 0.5; see verdict",
     ),
 )
 SWITCHED: Final = row(
     Field("source", get_kind("texts", minItems=1)),
-    Field("energy_frozen", "number", "came back at td"),
-    Field("energy_td", "number", "of the reference at td"),
-    Field("level_ratio", "number?", "energy_frozen over energy_td"),
-    Field("end", "number", "compared from td to here"),
+    Field("energy_frozen", "number", "energy of the switched run at td"),
+    Field("energy_td", "number", "energy of the reference run at td"),
+    Field("level_ratio", "number?", "energy_frozen divided by energy_td"),
+    Field("end", "number", "end of the comparison, which begins at td"),
     Field("mean_after", "number"), Field("mean_after_reference", "number"),
-    Field("spread_after", get_kind("number", minimum=0), "standard deviation"),
+    Field("spread_after", get_kind("number", minimum=0), "standard deviation of the energy after td in the switched "
+                                                         "run"),
     Field("spread_after_reference", get_kind("number", minimum=0)),
     Field("momentum_error", "size?",
-          "largest deviation after td relative to the largest momentum of the reference there"),
-    Field("displacement", "size?", "largest distance of the parts' centre from where the reference has it"),
+          "largest deviation of the momentum after td, relative to the largest momentum of the reference run after td"),
+    Field("displacement", "size?", "largest distance between the centers of the parts in the two runs after td"),
     Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", "texts"),
     Field("notes", "texts"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
@@ -58,7 +59,8 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
     keys.MATCHES._replace(get=lambda answer: answer.candidate.parts),
     keys.HEALTH,
     Field("reasons", "texts"),
-    Field("switched", maybe(SWITCHED), "a finished switched run held against the reference, null without --switched"),
+    Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
+                                       "--switched"),
     later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
            *keys.LATER),
 ))  # fmt: skip

@@ -323,7 +323,7 @@ def _report_disabled(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R302",
     INFO,
-    "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
+    "switches without a time of their own: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
     BOTH,
 )
 def _report_untimed(case: Case) -> Iterator[Objection]:
@@ -366,9 +366,7 @@ def _report_untimed(case: Case) -> Iterator[Objection]:
     Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")),
 )
 @set_failing(_make_elements("*ELEMENT_SHELL_DOF"), _make_elements("*ELEMENT_BEAM_PID"))
-@make_rule_decorator(
-    "D2R304", INFO, "elements of a kind that is not searched for shared nodes"
-)
+@make_rule_decorator("D2R304", INFO, "elements that are not searched for shared nodes")
 def _report_unread_elements(case: Case) -> Iterator[Objection]:
     """D2R108 searches the elements for nodes that separate rigid bodies share. Some options of element keywords put
     further integers on the element lines. d2rpick does not read such lines, so D2R108 may miss shared nodes.

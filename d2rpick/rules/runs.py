@@ -135,7 +135,7 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
 )
 def _check_order(case: RunCase) -> Iterator[Objection]:
     """Each engine file continues the run from the end of the one before. The files are numbered from 1 without gaps,
-    their /RUN lines have the same name, and no file ends before the one before it. Otherwise d2rpick cannot determine
+    their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick cannot determine
     when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's help for /RUN, and
     runs computed with OpenRadioss.
 

@@ -116,7 +116,9 @@ def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
 
 
 @set_failing(make_deck(BACK), make_deck(THERE + BACK.replace("  1  ", "  2  ")))
-@make_rule_decorator("D2R103", ERROR, "a part switched back that nothing made rigid")
+@make_rule_decorator(
+    "D2R103", ERROR, "a part switched back although no card made it rigid"
+)
 def _check_never_rigid(case: Case) -> Iterator[Objection]:
     """An R2D line for a part that no D2R line has made rigid before has no effect. Usually a part id is wrong on one of
     the two cards.

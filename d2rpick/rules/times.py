@@ -129,7 +129,7 @@ def _is_lost(window: SwitchWindow) -> bool:
 
 @set_failing(make_window("0.09", "0.02"), make_window("0.02", "0.02"))
 @make_rule_decorator(
-    "D2R102", ERROR, "switched back before (or when) it was switched to rigid", BOTH
+    "D2R102", ERROR, "a part switched back before, or when, it is made rigid", BOTH
 )
 def _check_times_in_order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch. The solver does not sort the switches by time.
@@ -184,9 +184,10 @@ def _check_zero_times(case: Case) -> Iterator[Objection]:
     "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
 )
 def _check_sampling(case: Case) -> Iterator[Objection]:
-    """Switching times are chosen from the internal energy of a reference run: glstat has the energy of the whole model,
-    matsum that of each part. If the output interval is too long, the energy at tr and td is not known well enough. This
-    rule does not apply to decks that contain only switching cards, or to checks with --history.
+    """Switching times are chosen from the internal energy of a reference run: glstat contains the energy of the whole
+    model, and matsum contains the energy of each part. If the output interval is too long, the energy at tr and td is
+    not known well enough. This rule does not apply to decks that contain only switching cards, or to checks with
+    --history.
 
     Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
@@ -303,7 +304,7 @@ def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | Non
 @make_rule_decorator(
     "D2R115",
     ERROR,
-    "the switching times are about 1000 times the termination time, or a thousandth of it",
+    "the switching times are about 1000 times the termination time, or 1/1000 of it",
 )
 def _check_units_of_deck(case: Case) -> Iterator[Objection]:
     """The deck seems to mix seconds and milliseconds: the switching times lie outside the run or in its first 1/1000,
@@ -398,7 +399,7 @@ def _check_units_of_history(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R207",
     ERROR,
-    "the switching times are about 1000 times those of the history, or a thousandth of them",
+    "the switching times are about 1000 times those of the history, or 1/1000 of them",
     BOTH,
 )
 def _check_times_of_history(case: Case) -> Iterator[Objection]:
@@ -436,7 +437,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
     """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
     should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges the parts that
     share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in
-    error if an oscillator describes the history, else the level error.
+    error if an oscillator describes the history, otherwise the level error.
 
     Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
     """
@@ -529,6 +530,6 @@ def _check_in_history(case: Case) -> Iterator[Objection]:
     d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td
     seems to have another unit.
 
-    Fix: Correct the time or the part id, or run the reference longer.
+    Fix: Correct the time or the part id, or extend the reference run.
     """
     return _report_faults(case, "D2R205")

@@ -20,13 +20,13 @@ from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
-    LOAD,
     Leg,
     LegFindings,
     Order,
     choose_next_leg,
     collect_joined_legs,
     find_window,
+    get_flight_findings,
 )
 from d2rpick.running.swing import find_swing
 
@@ -268,7 +268,7 @@ class Driver:
             _find_longest_wait(legs, first.start),
         )
         leg = Leg(order, findings, cycles, cpu)
-        place = self._warn_of_swing([*legs, leg], first)
+        place = _warn_of_swing([*legs, leg], self.limits)
         if place:
             self.told(f"warning: out-of-place: {place}")
         self.journal.add(
@@ -322,19 +322,16 @@ class Driver:
             f"leg {order.number} failed again before its first state: the leg before it is computed again"
         )
 
-    def _warn_of_swing(self, legs: Sequence[Leg], first: Order) -> str:
-        """Return a warning if parts swing too much in the window that the last leg ends; "" if not.
 
-        ``first`` is the leg in which the parts became rigid.
-        """
-        if legs[-1].findings.contact is None or first.number == 1:
-            return ""
-        window = find_window(legs, self.limits)
-        if window.reason:
-            return ""
-        deformable_legs = collect_joined_legs(first._replace(kind=LOAD), legs)[:-1]
-        histories = [self.solver.history(leg.number) for leg in deformable_legs]
-        return self.observer.warn_of_swing(histories, window)
+def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
+    """Return a warning if parts swing too much in the window that the last leg ends; "" if not."""
+    if legs[-1].findings.contact is None:
+        return ""
+    window = find_window(legs, limits)
+    findings = get_flight_findings(legs)
+    if window.reason or findings.steady_from <= window.td - window.free:
+        return ""
+    return f"tr = {window.tr:.6g}: {findings.swing_warning}"
 
 
 def _read_leg(record: dict[str, Any]) -> Leg:
@@ -378,9 +375,7 @@ class Observer:
         selection = Selection(
             parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
         )
-        # One follows the legs as they are added, the other reads the record before a window as a whole.
-        self._new_states = Looks(selection, inventory)
-        self._whole_record = Looks(selection, inventory)
+        self._looks = Looks(selection, inventory)
         self._given, self._of_deck = wait, of_deck
         self._evidence, self._motion = GrowingEvidence(), InnerMotion(None, of_deck)
 
@@ -393,7 +388,7 @@ class Observer:
         the record shows a longer one, which ``why`` then says.
         """
         names = [str(path) for path in histories]
-        states, follows = self._new_states.new_states(names)
+        states, follows = self._looks.new_states(names)
         if not follows:
             self._evidence = GrowingEvidence()
             self._motion = InnerMotion(None, self._of_deck, wait_before)
@@ -418,15 +413,19 @@ class Observer:
         if self._given is not None and not idle:
             longer = shown_wait is not None and shown_wait.time > self._given
             why = f"as given, but {why}" if longer else "as given"
+        tr = _choose_end(order, history, free)
+        swing = find_swing(history, free, tr)
         return LegFindings(
             free=free,
             wait=wait,
             why=why,
             flies=bool(flights) and flights[-1].end is None,
-            tr=_choose_end(order, history, free),
+            tr=tr,
             idle=idle,
             short=self._find_short_flights(order, wait),
             swing=self._motion.longest_swing(now),
+            steady_from=swing.flight if swing else 0.0,
+            swing_warning=swing.told if swing else "",
         )
 
     def _find_short_flights(
@@ -448,14 +447,6 @@ class Observer:
         if self._given is not None and not at_rest:
             return self._given
         return shown_wait.time if shown_wait else None
-
-    def warn_of_swing(self, histories: Sequence[Path], window: Window) -> str:
-        """Return a warning if parts swing too much before a window to become rigid; "" if not."""
-        history = self._whole_record.whole([str(path) for path in histories])
-        swing = find_swing(history, window.free, window.tr)
-        if swing is None or swing.flight <= window.td - window.free:
-            return ""
-        return f"tr = {window.tr:.6g}: {swing.told}"
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:

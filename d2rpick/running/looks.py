@@ -77,7 +77,7 @@ class Looks:
         if history is not None:
             new_states = skip_states(history, self._last_states)
         if history is None or new_states is None:
-            history = self.whole(names)
+            history = self._read_whole(names)
             new_states = skip_states(history, self._last_states)
         follows = new_states is not None
         if new_states is None:
@@ -86,7 +86,7 @@ class Looks:
         self._last_states = find_last_states(new_states, self._last_states)
         return new_states, follows
 
-    def whole(self, names: Sequence[str]) -> History:
+    def _read_whole(self, names: Sequence[str]) -> History:
         """Read all states of the files; errors as `new_states`."""
         self._read_files = {}
         sources = open_files(names)

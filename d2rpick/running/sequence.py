@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.flight.margin import SHARE
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.window import FEWEST
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Limits(NamedTuple):
             return self.margin
         if idle and self.shortest:
             return self.shortest
-        return max(self.shortest, SHARE * flight)
+        return max(self.shortest, LEAST_MARGIN * flight)
 
     @property
     def same(self) -> float:
@@ -122,6 +122,10 @@ class LegFindings(NamedTuple):
         First contact of the rigid body [time].
     swing : float
         Half of the longest swing so far, even if a push lengthened it [time].
+    steady_from : float
+        Length of the flight below which a swinging part displaces the body by more than 1 % of its path [time].
+    swing_warning : str
+        What the user is told of that part in a shorter flight; "" if there is none.
     """
 
     free: float = 0.0
@@ -133,6 +137,8 @@ class LegFindings(NamedTuple):
     short: tuple[tuple[float, float], ...] = ()
     contact: float | None = None
     swing: float = 0.0
+    steady_from: float = 0.0
+    swing_warning: str = ""
 
 
 class Leg(NamedTuple):
@@ -251,7 +257,7 @@ def _determine_probe_end(
 ) -> float:
     """Return the end of a leg that begins ``now`` in a probe that began at ``tr``."""
     length = max(
-        _get_flight_findings(legs).wait or 0.0,
+        get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * (now - tr),
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
@@ -262,7 +268,7 @@ def _determine_probe_end(
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     """Order the leg that ends the window at its td, or a deformable leg if the window does not pay off."""
     window, first = find_window(legs, limits), _get_first_rigid_leg(legs)
-    findings = _get_flight_findings(legs)
+    findings = get_flight_findings(legs)
     if window.reason:
         number, now = first.number, first.start
         until = _determine_load_end(
@@ -286,7 +292,7 @@ def find_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact shown by the last leg; without one, up to the end of the run."""
     tr, findings, contact = (
         _get_first_rigid_leg(legs).start,
-        _get_flight_findings(legs),
+        get_flight_findings(legs),
         legs[-1].findings.contact,
     )
     wait = findings.wait or 0.0
@@ -350,8 +356,8 @@ def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
     return collect_joined_legs(legs[-1].order, legs)[0]
 
 
-def _get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the results for the flight when it was switched: at the end of the last deformable leg."""
+def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
+    """Return what was seen of the flight when it was switched: at the end of the last deformable leg."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 

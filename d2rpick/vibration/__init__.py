@@ -1,8 +1,8 @@
 """Identify the vibration: find the models that describe it, best first.
 
 Every measure of a pair (tr, td) needs the deformations at both times and how they lie to each other (`measures`).  The
-energy does not show the sign of a deformation, so a model must.  `find_models` looks for them in this order, and
-`model.model_at` decides which one can be relied on at a td:
+energy does not show the sign of a deformation, so a model must.  `find_part_signs`, `span` and `find_models` look for
+them in this order, and `model.model_at` decides which one can be relied on at a td:
 
 1. parts (`part_signs`, `waves`): the deformation of each part with its sign, from the zeros of its own energy,
    confirmed by a few damped waves; E = q^2 for each part.
@@ -20,22 +20,22 @@ energy does not show the sign of a deformation, so a model must.  `find_models` 
 Lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy, or replace them where plastic
 flow or a damper's work hides these.
 
-A further model is a class in a module of its own, its name in `SignedModel`, its finder, and its line in `MODELS`.  It
-has the methods of a `Deformation`, ``time`` (n,), ``signed`` (True if it covers enough of the energy), what is known at
-a td, and words: what a choice rests on (``told``), what the kinetic share is (``kinetic``), and why a tr has no
-measures (``undescribed``).
+A further model is a class in a module of its own, its name in `SignedModel` and `MODELS`, and its finder in
+`find_models`.  It has the methods of a `Deformation`, ``time`` (n,), ``signed`` (True if it covers enough of the
+energy), what is known at a td, and words: what a choice rests on (``told``), what the kinetic share is (``kinetic``),
+and why a tr has no measures (``undescribed``).
 """
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
+from d2rpick.base.memory import remember
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from typing import TypeAlias
 
-    from d2rpick.histories.history import History, Memory, Samples
+    from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
@@ -56,107 +56,82 @@ class VibratingTogether(Protocol):
 
 if TYPE_CHECKING:
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[
-        [History, Span, VibratingTogether, Memory], SignedModel | None
-    ]
+
+# Models by name, best first.
+MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
 
 
-def _find_parts(
-    history: History, within: Span, _: VibratingTogether, __: Memory
-) -> SignedModel | None:
-    """Determine the signs of single parts if their energies are written."""
-    time = history.between(*within)[0]
+def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
+    """Read the signs of single parts in a window around td, if their energies are written; return them by name."""
+    from d2rpick.histories.samples import get_ends
+
+    time = history.between(*around)[0]
     if history.part_energies is None or time.size < 3:
-        return None
+        return {}
+    return {"parts": _read_part_signs(history, *get_ends(time))}
+
+
+@remember
+def _read_part_signs(history: History, first: float, last: float) -> SignedParts:
+    """Read the signs of single parts from their energies between two states, by their times."""
     from d2rpick.histories.samples import find_window
     from d2rpick.vibration.part_signs import SignedParts
 
+    assert history.part_energies is not None
+    inside = find_window(history.time, first, last)
     return SignedParts(
-        time,
-        history.part_energies[find_window(history.time, *within)],
-        history.part_names,
+        history.time[inside], history.part_energies[inside], history.part_names
     )
 
 
+def find_models(
+    history: History, flight: Span, settled: Span, *, together: VibratingTogether
+) -> dict[str, SignedModel]:
+    """Look for models of the whole energy in a ``flight``, best first, until one tells the sign; return them by name.
+
+    Swings are counted in the flight from when the energy has ``settled``, which may be before it.
+    """
+    from d2rpick.histories.samples import get_ends
+
+    models: dict[str, SignedModel] = {}
+    ends = get_ends(history.between(*flight)[0])
+    modal = _find_modal(history, *ends, together=together) if ends else None
+    if modal is not None:
+        models["modal"] = modal
+        # modes may leave so much open that counted swings, if there are any, say more
+        if modal.signed and not modal.is_vague:
+            return _rely_on_vague(models)
+    ends = get_ends(history.between(*settled)[0])
+    swings = _find_swings(history, *ends) if ends else None
+    if swings is not None:
+        models["swings"] = swings
+    return _rely_on_vague(models)
+
+
+@remember
 def _find_modal(
-    history: History, within: Span, together: VibratingTogether, memory: Memory
-) -> SignedModel | None:
-    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if written."""
+    history: History, first: float, last: float, *, together: VibratingTogether
+) -> ModalVibration | None:
+    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
     if not together.complete:
         return None
     from d2rpick.vibration.modal import confirm_by_kinetic_energy, identify_modal
     from d2rpick.vibration.modal_span import identify_window
+    from d2rpick.vibration.span import Span
 
-    internal = identify_window(history, within, memory)
+    internal = identify_window(history, Span(first, last))
     kinetic = together.kinetic
     return confirm_by_kinetic_energy(
         internal, identify_modal(*kinetic, kinetic=True) if kinetic else None
     )
 
 
-def _find_swings(
-    history: History, within: Span, _: VibratingTogether, __: Memory
-) -> SignedModel | None:
-    """Count the oscillations of the energy, provided that they return to a common minimum."""
+@remember
+def _find_swings(history: History, first: float, last: float) -> Swings | None:
+    """Count the swings of the energy, provided that they return to a common minimum."""
     from d2rpick.vibration.swings import count_swings
 
-    return count_swings(*history.between(*within))
-
-
-# Models by name, with the function that finds each.
-# The function is None for models that are found for each td in another way.
-MODELS: Final[dict[str, Finder | None]] = {
-    "parts": _find_parts,
-    "oscillator": None,
-    "modal": _find_modal,
-    "swings": _find_swings,
-    "energy": None,
-}
-
-
-def find_models(
-    history: History,
-    around: Span,
-    flight: Span | None,
-    settled: Span | None,
-    doubtful: Callable[[], bool],
-    memory: Memory,
-    together: VibratingTogether,
-) -> dict[str, SignedModel]:
-    """Find models, best first, until one gives the sign; after the oscillator only if it is ``doubtful``.
-
-    The window ``around`` td is used, for models after the oscillator the ``flight`` if one is known, and for swings
-    also the time before it, from when the energy has ``settled``.
-    """
-    from d2rpick.histories.samples import get_ends
-
-    models: dict[str, SignedModel] = {}
-    span = around
-    for basis, find in MODELS.items():
-        if basis == "oscillator":
-            if flight is None or not doubtful():
-                break
-            span = flight
-        if basis == "swings" and settled is not None:
-            span = settled
-        if find is None:
-            continue
-        model = memory.once(
-            (basis, *get_ends(history.between(*span)[0])),
-            partial(find, history, span, together, memory),
-        )
-        if model is not None:
-            models[basis] = model
-            if model.signed and not _is_vague(model):
-                break
-    return _rely_on_vague(models)
-
-
-def _is_vague(model: SignedModel) -> bool:
-    """Return True if the modes are so uncertain that counted oscillations, if there are any, are better."""
-    from d2rpick.vibration.modal import ModalVibration
-
-    return isinstance(model, ModalVibration) and model.is_vague
+    return count_swings(*history.between(first, last))
 
 
 def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:

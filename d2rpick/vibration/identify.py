@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.history import Memory
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.modes import Mode, compute_energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
 
@@ -109,7 +110,11 @@ class Identification(NamedTuple):
 
 
 def identify(
-    time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None
+    time: Samples,
+    energy: Samples,
+    *,
+    quick: bool = False,
+    rates: NDArray[np.complex128] | None = None,
 ) -> Identification:
     """Fit a vibration to E(t), else one with plastic work, else one with a preload, and judge the fit.
 
@@ -121,8 +126,8 @@ def identify(
         Internal energy; may be zero or negative, as some solvers write it [energy].
     quick : bool
         Refuse where a few samples show that no model follows, without the best fit to all of them and its misfit.
-    memory : Memory
-        Of the record that these samples are a window of: its ends tell the window.
+    rates : array of shape (k,), optional
+        The result of `find_rates` for these samples, if it is known.
 
     Returns
     -------
@@ -147,7 +152,7 @@ def identify(
     if lacking := _refuse_short_record(time, energy):
         return lacking
     record = _Record.scaled(time, energy)
-    poles = record.pencil(memory).rates()
+    poles = find_rates(time, energy) if rates is None else rates
     if poles.size == 0:
         return _refuse_without_fit(
             time, "the energy does not oscillate: nothing vibrates, or it is overdamped"
@@ -170,6 +175,17 @@ def identify(
         if parameters is not None
     )
     return _choose_first_to_follow(attempts, record)
+
+
+def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
+    """Return the complex rates of the exponentials that E may contain, in units of the record's length, shape (k,).
+
+    A record that has too little for any judgement has none.
+    """
+    if _refuse_short_record(time, energy):
+        return np.zeros(0, np.complex128)
+    record = _Record.scaled(time, energy)
+    return fitting.Pencil.of(record.s, record.e).rates()
 
 
 def _choose_first_to_follow(
@@ -278,12 +294,6 @@ class _Record(NamedTuple):
         with np.errstate(over="ignore"):
             scaled = energy / scale
         return cls((time - start) / (end - start), scaled, start, end, scale)
-
-    def pencil(self, memory: Memory | None) -> fitting.Pencil:
-        """Return the signal subspace of E, computed once for all fits that share a memory."""
-        return (memory or Memory()).once(
-            ("pencil", self.start, self.end), lambda: fitting.Pencil.of(self.s, self.e)
-        )
 
     @property
     def units(self) -> Samples:

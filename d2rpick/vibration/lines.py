@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # A higher order must reduce the prediction error by this factor; below the second value no higher order is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
-# Share of the record that is fitted to predict the remainder.
+_BETTER, _OF_A_LINE = 0.97, 16.0
+# Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], at most half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
@@ -37,11 +38,14 @@ _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
 # Times are evenly spaced if they deviate by less than this share of a step, by single precision or printed digits.
 _EVEN: Final = 1e-3
 # The power of white noise hardly exceeds this many times its median.
-_ABOVE_NOISE: Final = 10.0
-# Shares of the power of an energy without its trend: lines up to the first share are relevant, up to the second strong.
-_ALL_POWER, _STRONG_POWER = 0.999, 0.95
-# A line has at least one period in the record, and a decay below this share of its rate.
-# The third value is the largest exponent of its decay within the record.
+_ABOVE_NOISE: Final = 20.0
+# Shares of the power of an energy about its trend: rates up to the first share are relevant, up to the second strong.
+# A line of 1 % of the strongest one's height has 1e-4 of its power, and beyond the grid it would pass for a slower one.
+_ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
+# A line that has decayed within a part of the record is sought in the first part of this length [share of the record].
+_EARLY: Final = 0.25
+# A line swings at least once in the record, and decays by less than this share of its rate and by fewer powers of e
+# within the record than the third value.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
 # A free vibration does not grow; noise hides a growth of this exponent over the record.
 _MOST_GROWTH: Final = 0.2
@@ -114,15 +118,11 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
         )  # imported here: scipy makes the start slower
 
         values = CubicSpline(time, energy)(even)
-    reach = even - even[0]
-    trend = np.polyval(np.polyfit(reach, values, 2), reach)
-    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # white noise has as much power at the highest rates as anywhere
-    noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
-    running = np.cumsum(np.maximum(power - noise, 0.0))
-    fastest, strongest = np.searchsorted(
-        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
-    ).tolist()
+    fastest, strongest = _count_turns(even, values)
+    early = int(_EARLY * time.size)
+    if early >= _FEWEST_STATES:
+        fastest_early, _ = _count_turns(even[:early], values[:early])
+        fastest = max(fastest, fastest_early / _EARLY)
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
@@ -137,6 +137,20 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
         size=size,
         strong=count / max(strongest, 1),
     )
+
+
+def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
+    """Return the turns of the fastest relevant line and of the fastest strong line within equidistant times (n,)."""
+    reach = time - time[0]
+    trend = np.polyval(np.polyfit(reach, values, 2), reach)
+    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
+    # white noise has as much power at the highest rates as anywhere
+    noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
+    running = np.cumsum(np.maximum(power - noise, 0.0))
+    fastest, strongest = np.searchsorted(
+        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
+    ).tolist()
+    return fastest, strongest
 
 
 class Exponentials(NamedTuple):
@@ -240,7 +254,7 @@ def predict(grid: Grid) -> Prediction | None:
                 np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
             )
             missed = float(np.hypot(error, spectrum.error)) / swing
-            if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
+            if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
         if tried[-1][0] < _PERFECT:
             break
@@ -250,6 +264,13 @@ def predict(grid: Grid) -> Prediction | None:
     poles = _SignalSpace.of(grid).poles(order)
     whole = fit_spectrum(grid, poles, grid.span, every_decay=every_decay)
     return Prediction(whole, of_first, missed, swing)
+
+
+def _get_needed(spectrum: Spectrum) -> float:
+    """Return the factor by which a higher order must reduce the prediction error of a spectrum [-]."""
+    powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
+    typical = float(np.mean(powers))
+    return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.lines import Exponentials
+    from d2rpick.vibration.lines import Exponentials, Spectrum
 
 # Smallest relevant line relative to the strongest line, the same relative to a partner line, and in units of scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
@@ -18,16 +19,27 @@ NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
 _SAME_RATE: Final = 0.1
 # Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# Number of the strongest lines whose harmonics are searched, and the orders of the harmonics.
+# A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
+# is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
+_THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
+# Multiples of its rate at which a stretch that swings has energy: a pendulum's pull has a few harmonics.
+_OWN_MULTIPLES: Final = (1, 2, 3, 4)
+# Logarithm of the ratio of two heights that count as one.
+_SAME_HEIGHT: Final = 0.1
+# Number of strongest lines whose harmonics are searched, and their orders.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class StretchLine(NamedTuple):
-    """The ``line`` of a static stretch in the mode of the line ``of_mode``, and its ``energy`` [energy]."""
+    """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy].
+
+    ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
+    """
 
     line: int
     of_mode: int
     energy: float
+    swings: bool = False
 
 
 def find_stretches(
@@ -37,6 +49,7 @@ def find_stretches(
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
+    A stretch that swings itself, as that of a part on a hinge, has two such lines, one on each side.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag
@@ -65,7 +78,114 @@ def find_stretches(
                     )
                 )
                 break
-    return tuple(stretches)
+    side_lines = _find_side_lines(lines, span, scatter)
+    no_modes = {stretch.line for stretch in side_lines}
+    return (
+        *(stretch for stretch in stretches if stretch.of_mode not in no_modes),
+        *side_lines,
+    )
+
+
+def _find_side_lines(
+    lines: Exponentials, span: float, scatter: float
+) -> list[StretchLine]:
+    """Find the lines of modes about stretches that swing.
+
+    A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
+    their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
+    multiples of s, which are no modes either.
+    """
+    size = np.abs(lines.weights)
+    rate = lines.poles.imag
+    phase = _find_phases_in_middle(lines, span)
+    least = max(NOTABLE * float(size.max(initial=0.0)), ABOVE_SCATTER * scatter)
+    middle_size = size * np.exp(lines.poles.real * span / 2)
+    stretches = []
+    for first, second in combinations(np.flatnonzero(size > least).tolist(), 2):
+        if abs(np.log(middle_size[first] / middle_size[second])) > _SAME_HEIGHT:
+            continue
+        apart = np.abs(rate - rate[first] - rate[second]) * span
+        own_line = int(np.argmin(apart))
+        turned = phase[own_line] - phase[first] - phase[second]
+        is_locked = abs(_wrap(float(turned), 2 * np.pi)) < _SAME_PHASE
+        if apart[own_line] > 2 * np.pi * _SAME_RATE or not is_locked:
+            continue
+        energy = float(size[first] ** 2 / (8 * size[own_line]))
+        stretches += [
+            StretchLine(line, own_line, energy, swings=True) for line in (first, second)
+        ]
+        rate_of_swing = abs(rate[first] - rate[second]) / 2
+        multiples = np.outer(rate_of_swing, _OWN_MULTIPLES)
+        off_multiples = np.abs(rate[:, np.newaxis] - multiples).min(axis=1) * span
+        own_energy = np.flatnonzero(off_multiples < 2 * np.pi * _SAME_RATE).tolist()
+        stretches += [
+            StretchLine(line, own_line, 0.0, swings=True) for line in own_energy
+        ]
+    return stretches
+
+
+class ThirdHarmonic(NamedTuple):
+    """The line at three times the rate of a line whose second harmonic is locked to it, in the middle of the window.
+
+    A stretch has a line and its second harmonic, and so has a spring that stiffens; a third harmonic has only the
+    spring.  ``expected`` is its height for that spring, ``measured`` what the record has there in phase with the first
+    line, ``scatter`` that of a height [energy]; ``second`` is the height of the second harmonic over the first line.
+    """
+
+    second: float
+    expected: float
+    measured: float
+    scatter: float
+
+    @property
+    def may_be_of_spring(self) -> bool:
+        """Return True if the line is as high as that of a stiffening spring, as far as the record can show."""
+        if self.second > _HIGHEST_SECOND:
+            return False
+        room = _THIRD_ROOM * self.expected + ABOVE_SCATTER * self.scatter
+        return abs(self.measured - self.expected) <= room
+
+    @property
+    def is_of_spring(self) -> bool:
+        """Return True if the line is that of a stiffening spring, and too high for none."""
+        is_seen = self.expected > 2 * ABOVE_SCATTER * self.scatter
+        return self.may_be_of_spring and is_seen
+
+
+def measure_third_harmonic(
+    stretch: StretchLine, spectrum: Spectrum, time: Samples, scatter: float
+) -> ThirdHarmonic:
+    """Measure the third harmonic of a line whose second harmonic is the line of a mode, if it is not one of a spring.
+
+    Parameters
+    ----------
+    stretch : StretchLine
+        The two lines.
+    spectrum : Spectrum
+        Fitted to the grid of ``time`` (n,) [time].
+    scatter : float
+        Of the height of a line [energy].
+    """
+    middle = (time[0] + time[-1]) / 2
+    lines = spectrum.lines
+    heights = lines.waves(middle) * lines.weights
+    first = heights[stretch.line]
+    second = float(abs(heights[stretch.of_mode]))
+    pole = lines.poles[stretch.line]
+    span = time[-1] - time[0]
+    third_pole = 3 * pole.real + 3j * pole.imag
+    is_third = (
+        np.abs(lines.poles.imag - third_pole.imag) * span < 2 * np.pi * _SAME_RATE
+    )
+    course = np.exp(third_pole * (time - middle))
+    in_rest = 2 * (course.conj() @ spectrum.rest) / np.sum(np.abs(course) ** 2)
+    third = np.sum(heights[is_third]) + in_rest
+    return ThirdHarmonic(
+        second / float(abs(first)),
+        _THIRD_OF_SPRING * second**2 / float(abs(first)),
+        float((third * (first.conj() / abs(first)) ** 3).real),
+        scatter * float(np.exp(max(-third_pole.real, 0.0) * span / 2)),
+    )
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:

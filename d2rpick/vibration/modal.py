@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
+from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
     ABOVE_SCATTER,
@@ -23,6 +24,7 @@ from d2rpick.vibration.locked_lines import (
     StretchLine,
     find_stretches,
     measure_harmonics,
+    measure_third_harmonic,
 )
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
@@ -83,10 +85,23 @@ _LEAST_HALF: Final = 0.006
 _VAGUE_HALF: Final = (
     0.2  # half-width of R^2 of vague modes; well-identified modes have 0.02 to 0.1
 )
-_SOME_TIMES: Final = 64  # number of times at which the width of the band is checked
-_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 1.6
-_DRIFT_OF_NOISE: Final = 0.08
-_HIDDEN_LINES: Final = 12  # number of lines that may be hidden in the misfit
+_SOME_TIMES: Final = 64  # at which the band is looked at as a whole
+# Standard deviations of R^2 that its band has to each side, as for one oscillator.
+_DEVIATIONS: Final = 2.5
+# What remains of the record beside its lines changes R^2 by this many times its share of the energy: V enters it at tr
+# and, twice, halfway, and 1.6 is the ratio of the 90 % quantile of a normal distribution to its deviation.
+_REST_COUNTS: Final = 1.6 * np.sqrt(5)
+# A correlation of neighbouring states below this many standard errors is one of noise.
+_CHANCE: Final = 2.0
+# Effects on R^2: of a mean energy that changes in the flight, where the first part predicts the rest as badly as
+# `_LITTLE_MISSED`; and of a negative static energy, or one too small for its stretch.
+_DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
+# Effect of the second harmonic of a stiffening spring on R^2, where both deformations are alike, and where they are
+# farthest from being alike or opposite.  A spring whose amplitude falls also changes its rate.
+_BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
+# Difference of a swinging stretch at two times, squared, over its mean square: 2 on average, 8 at most.
+_SWINGING_COUNTS: Final = 4.0
+_HIDDEN_LINES: Final = 12  # number of lines that may hide in the rest of the fit
 
 
 class Doubts(NamedTuple):
@@ -186,8 +201,12 @@ class ModalVibration:
         Share of the scatter that neighbouring states share, and which is believed [-].
     states_per_period : float
         States of the record in a period of the fastest line that is told from noise [-].
-    slack : float
-        Negative static energy that noise makes, over the mean vibration energy [-].
+    scatter : LineScatter
+        Scatter of R^2 that follows from that of the record.
+    swinging : float
+        Mean energy of stretches that swing, which no mode has [energy].
+    bent : float
+        Second harmonic of a line that is, or may be, that of a stiffening spring, over the line; 0 without one [-].
     source : str
         The energy that the lines were found in.
     second : Reading or None
@@ -204,7 +223,9 @@ class ModalVibration:
     noise: float
     systematic: float
     states_per_period: float
-    slack: float
+    scatter: LineScatter
+    swinging: float = 0.0
+    bent: float = 0.0
     source: str = "internal energy"
     second: Reading | None = None
     last_resort: bool = False
@@ -323,18 +344,34 @@ class ModalVibration:
             np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
             / level
         )
-        scatter = self.noise / level * np.sqrt(5 * self.systematic + 0.5)
+        deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
+        # both show how well the lines are known: by their scatter, and by a part of the record
+        of_lines = np.maximum(deviation, lines)
+        of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         width_of_neglected = np.zeros_like(squared)
         if self.second is not None:
             width_of_neglected = np.abs(self.second.residual_squared(tr, td) - squared)
         return np.asarray(
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
-            + np.minimum(lines, 1.0)
-            + _NOISE_COUNTS * scatter
+            + np.minimum(of_lines, np.maximum(squared, 1.0))
+            + of_rest
             + self._phase_share * squared
+            + self._compute_effect_of_swinging(squared, level)
+            + self.bent * (_BENT_ALIKE + _BENT_ACROSS * _compute_sine(squared))
             + width_of_neglected
             + self._of_other_readings(tr, td, squared)
         )
+
+    def _compute_effect_of_swinging(self, squared: Samples, level: Samples) -> Samples:
+        """Return how far R^2 may be off since a stretch differs at tr and td, where modes have ``squared`` [-]."""
+        apart = np.sqrt(_SWINGING_COUNTS * self.swinging / level)
+        return np.asarray(2 * apart * np.sqrt(squared) + apart**2)
+
+    @property
+    def _structure_of_rest(self) -> float:
+        """Return the share of the rest that neighbouring states have in common beyond chance [-]."""
+        chance = _CHANCE / np.sqrt(self.reading.spectrum.rest.size)
+        return max(self.systematic - float(chance), 0.0)
 
     @cached_property
     def is_vague(self) -> bool:
@@ -374,11 +411,12 @@ class ModalVibration:
     def _wrong(self) -> float:
         """Return the error that widens the band of all pairs equally [-]."""
         doubts = self.doubts
-        drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
-        negative = max(doubts.negative - self.slack, 0.0)
+        if self.reading.no_static:
+            return doubts.harmonic  # the other reading shows what the mean is worth
+        badly_predicted = min(doubts.missed / _LITTLE_MISSED, 1.0)
         return (
-            _DRIFT_COUNTS * doubts.drift * drifts
-            + _NEGATIVE_COUNTS * (negative + doubts.unstretched)
+            _DRIFT_COUNTS * doubts.drift * badly_predicted
+            + _NEGATIVE_COUNTS * max(doubts.negative, doubts.unstretched)
             + doubts.harmonic
         )
 
@@ -396,9 +434,7 @@ class ModalVibration:
             return np.zeros(squared.shape)
         # lines hidden in the misfit have at most this energy in addition to the identified lines
         hidden = (
-            2
-            * np.sqrt(2 * _HIDDEN_LINES)
-            * self.noise
+            _find_most_hidden(self.reading.spectrum.rest)
             / self.reading.level(td)
             * np.abs(1.5 - squared)
         )
@@ -503,7 +539,21 @@ def _read(
         / max(float(np.sum(remainder**2)), 1e-300)
     )
     systematic = float(np.clip(shared, 0.0, 1.0))
-    stretches = find_stretches(spectrum.lines, grid.span, scatter)
+    locked = find_stretches(spectrum.lines, grid.span, scatter)
+    thirds = {
+        stretch: measure_third_harmonic(stretch, spectrum, grid.time, scatter)
+        for stretch in locked
+        if not stretch.swings
+    }
+    springs = [third for third in thirds.values() if third.may_be_of_spring]
+    stretches = tuple(
+        stretch
+        for stretch in locked
+        if stretch.swings or not thirds[stretch].is_of_spring
+    )
+    may_be_spring = any(
+        third.may_be_of_spring and not third.is_of_spring for third in springs
+    )
     is_mode = _mask_modes(spectrum.lines, stretches)
 
     plain = Reading(
@@ -526,11 +576,15 @@ def _read(
         and not kinetic
         and excess < _AMBIGUOUS * float(np.mean(half_of_all))
     )
-    no_static = abs(share) < _NO_STATIC and not stretches and not kinetic
+    hidden = _find_most_hidden(remainder)
+    unresolved = share * mean < hidden / 2
+    no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
     reading = plain if no_static else with_static
     other_readings: tuple[Reading, ...] = ()
     if ambiguous:
         other_readings = (plain,)
+    elif may_be_spring and stretches:
+        other_readings = (replace(with_static, is_mode=plain.is_mode),)
     elif not stretches and not kinetic:
         other_readings = (with_static if no_static else plain,)
 
@@ -549,16 +603,15 @@ def _read(
     doubts = Doubts(
         missed=prediction.missed,
         misfit=noise / prediction.swing,
-        negative=max(-share, 0.0),
+        negative=max(-share - 2 * is_mode.size * scatter / mean, 0.0),
         drift=float(np.std(static)) / mean,
         beyond=_measure_beyond_bounds(reading, grid),
         harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
-        unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)),
+        unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)) * bool(stretches),
         coarse=grid.strong,
     )
     if kinetic:
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
-    slack = 0.02 + 2 * is_mode.size * scatter / mean
     return ModalVibration(
         _close_times(reading, window, grid.time.size),
         reading,
@@ -568,9 +621,26 @@ def _read(
         noise,
         systematic,
         min(grid.strong, _count_states(spectrum.lines, grid, scatter)),
-        slack,
+        LineScatter(reading, grid, systematic),
+        sum(stretch.energy for stretch in stretches if stretch.swings),
+        max((third.second for third in springs), default=0.0),
         "kinetic energy" if kinetic else "internal energy",
     )
+
+
+def _find_most_hidden(rest: Samples) -> float:
+    """Return the most vibration energy that lines hidden in the rest (n,) of a fit may have [energy].
+
+    None of them is higher than the highest line of the rest, and together they are no more than the rest.
+    """
+    highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
+    most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
+    return float(2 * _HIDDEN_LINES * min(highest, most_together))
+
+
+def _compute_sine(squared: Samples) -> Samples:
+    """Return the sine of the angle between deformations of equal size whose R^2 is ``squared``, not negative [-]."""
+    return np.asarray(np.sqrt(np.maximum(squared * (4 - squared), 0.0)) / 2)
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
@@ -14,11 +15,13 @@ from d2rpick.vibration.span import Span
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.histories.history import History, Memory, Samples
+    from d2rpick.histories.history import History, Samples
 
 # Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
-# Starts, as shares of the record, of windows that end with the record.
+# Windows around a flight that the energy alone shows begin and end at multiples of 1/32 of the record.
+_SMALL_PARTS: Final = 32
+# Shares of the record at which windows that reach its end begin.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window the record follows the modes while means over 1/8 of the fastest period deviate little:
 # by less than this share of the vibration energy, or this many times the scatter of such means.
@@ -35,7 +38,7 @@ class ModalWindow(NamedTuple):
 
 
 def find_described(
-    history: History, td: float, guess: Span | None, memory: Memory
+    history: History, td: float, guess: Span | None
 ) -> ModalWindow | None:
     """Find a window around td in which modes continue undisturbed; None if none is found.
 
@@ -46,32 +49,24 @@ def find_described(
         [time]
     guess : Span or None
         Where the energy seems to keep its level [time].
-    memory : Memory
-        Of the record: what was identified in a window is looked for once.
     """
     for window in _list_windows(history, td, guess):
-        described = _described_from(history, window, memory)
+        described = _grow_described(history, window)
         if described is not None:
             return described
     return None
 
 
-def _described_from(
-    history: History, window: Span, memory: Memory
-) -> ModalWindow | None:
-    """Extend a window in which modes continue undisturbed; None if they do not.
+@remember
+def _grow_described(history: History, window: Span) -> ModalWindow | None:
+    """Grow a window whose modes go on by themselves; None if they do not.
 
-    What comes out depends on the window alone, not on the td that was asked for first.
+    The result depends on the window alone, not on the td that was asked for first.
     """
-    key = ("described by modes", *window)
-    return memory.once(key, lambda: _look_in(history, window, memory))
-
-
-def _look_in(history: History, window: Span, memory: Memory) -> ModalWindow | None:
-    vibration = identify_window(history, window, memory)
+    vibration = identify_window(history, window)
     if vibration is None or not vibration.convinces:
         return None
-    return _grow_window(history, ModalWindow(vibration, window), memory)
+    return _grow_window(history, ModalWindow(vibration, window))
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
@@ -85,6 +80,16 @@ def get_inner_window(history: History, guess: Span) -> Span:
     else:
         end = first + part * np.floor((guess.end - first) / part)
     return Span(float(start), float(end))
+
+
+def get_outer_window(history: History, guess: Span) -> Span:
+    """Return the whole small parts of a record that contain a guessed window, so that guesses of many td share it."""
+    first = float(history.time[0])
+    last = float(history.time[-1])
+    part = (last - first) / _SMALL_PARTS
+    start = first + part * np.floor((guess.start - first) / part)
+    end = first + part * np.ceil((guess.end - first) / part)
+    return Span(max(float(start), first), min(float(end), last))
 
 
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
@@ -102,23 +107,27 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
     )
 
 
-def identify_window(
-    history: History, window: Span, memory: Memory
-) -> ModalVibration | None:
+def identify_window(history: History, window: Span) -> ModalVibration | None:
     """Identify the modes of the states in a window, once for all windows that hold the same states."""
-    time, energy = history.between(*window)
-    return memory.once(("lines", *get_ends(time)), lambda: identify_modal(time, energy))
+    time, _ = history.between(*window)
+    return _identify_states(history, *get_ends(time)) if time.size else None
 
 
-def _grow_window(
-    history: History, described: ModalWindow, memory: Memory
-) -> ModalWindow:
-    """Extend a window while the record follows its modes, identify them again, and repeat until it is constant."""
+@remember
+def _identify_states(
+    history: History, first: float, last: float
+) -> ModalVibration | None:
+    """Identify the modes of the states from one to another, by their times."""
+    return identify_modal(*history.between(first, last))
+
+
+def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
+    """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
     for _ in range(_MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
             break
-        vibration = identify_window(history, span, memory)
+        vibration = identify_window(history, span)
         if vibration is None or not vibration.convinces:
             break
         described = ModalWindow(vibration, span)

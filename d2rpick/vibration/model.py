@@ -91,6 +91,8 @@ class Vibration:
         What the kinetic share is an estimate from, and why; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
+    aliased : bool
+        Whether so few states were written per period that what swings may be faster, and modes are not relied on.
     parts : SignedParts or None
         What single parts tell, also where it is not relied on.
     """
@@ -103,6 +105,7 @@ class Vibration:
     told: str = ""
     estimated: str | None = None
     doubts: tuple[str, ...] = ()
+    aliased: bool = False
     parts: SignedParts | None = None
 
     @property
@@ -405,6 +408,12 @@ class Evidence(NamedTuple):
         return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
+    def has_sure_modes(self) -> bool:
+        """Return True if modes tell the sign, and not only for want of anything better."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal is not None and modal.doubts.refusal is None
+
+    @property
     def states_per_period(self) -> float | None:
         """Return the states per period of the fastest line of the energy [-]; None if no lines were searched."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
@@ -442,7 +451,9 @@ def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
         if whole.compared or model.known_at(td):
             return _compare_with_signs(whole, basis, model)
         return _note_sunk(whole)
-    if whole.doubts or not is_doubtful(whole) or not model.known_at(td):
+    if whole.doubts or whole.aliased:
+        return whole
+    if not is_doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
@@ -509,9 +520,11 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
+        # lines need fewer states than a level, and refuse a record that has too few for them
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
-            doubts=(*prescribed, *_find_aliasing(history, fit)),
+            doubts=prescribed,
+            aliased=not evidence.has_sure_modes and _is_aliased(history, fit),
         )
     if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
         return samples(
@@ -542,14 +555,15 @@ def describe_energy_at(
     return SampledEnergy(history, td)
 
 
-def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
-    """Return a doubt if the energy oscillates so fast that the states miss level and vibration."""
+def count_states_of_oscillator(history: History, fit: Identification) -> float | None:
+    """Return the number of states per period of the energy of a fit near the record; None without such a fit."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
-        return ()
+        return None
     time, _ = history.between(fit.start, fit.end)
-    states = count_samples_per_period(time, fit.mode)
-    if states >= MIN_SAMPLES_PER_PERIOD:
-        return ()
-    return (
-        f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
-    )
+    return count_samples_per_period(time, fit.mode)
+
+
+def _is_aliased(history: History, fit: Identification) -> bool:
+    """Return True if an oscillator near the record has so few states per period that it may be a faster one."""
+    states = count_states_of_oscillator(history, fit)
+    return states is not None and states < MIN_SAMPLES_PER_PERIOD

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from functools import partial
 from itertools import product
 from math import ceil, log
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.history import History, Memory, Samples
 from d2rpick.histories.samples import get_ends, integrate_by_trapezia
 from d2rpick.vibration.fitting import average_cells
-from d2rpick.vibration.identify import Identification, identify
+from d2rpick.vibration.identify import (
+    Identification,
+    find_rates,
+    identify,
+    judge_given,
+)
 from d2rpick.vibration.modes import BLOCK, Mode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from typing import Protocol
 
-    class Fitter(Protocol):
-        """Function that fits an oscillator to samples; with ``quick`` a refusal may use a selection of them."""
+    from numpy.typing import NDArray
 
-        def __call__(
-            self, time: Samples, energy: Samples, *, quick: bool = False
-        ) -> Identification:
-            """Fit and judge an oscillator, as `identify` does."""
-
-    Reach = Callable[
-        [float, Identification], "Span | None"
-    ]  # length of the record around a time that follows a fit
+    from d2rpick.histories.history import History, Samples
 
     class Damped(Protocol):
         """Interface of what is fitted to an energy: a mode, or waves with a common deformation."""
@@ -72,8 +68,12 @@ _MOST_REFITS = 8
 # Real solvers have errors of this size.
 SMALLEST: Final = 1e-3
 _MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
-_FINER: Final = 4  # points per line of a spectrum, so that a peak is not missed
-_CELLS_PER_PERIOD: Final = 4  # cells per period of the fastest line: fewer would hide most of it in their means
+_FINER: Final = 4  # points per line of a spectrum, so that its peak is met
+_CELLS_PER_PERIOD: Final = (
+    4  # of the fastest line: with fewer, means over cells would hide most of it
+)
+# Times between which no state lies.
+_NO_STATE: Final = (np.inf, np.inf)
 
 
 class Span(NamedTuple):
@@ -87,10 +87,10 @@ def find_described_span(
     history: History,
     td: float,
     bounds: Span,
-    fitter: Fitter = identify,
+    oscillator: Mode | None = None,
     *,
     whole: bool = False,
-    memory: Memory | None = None,
+    quick: bool = False,
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last one before td.
 
@@ -104,12 +104,12 @@ def find_described_span(
         [time]
     bounds : Span
         Where to look [time].
-    fitter : callable
-        Gives the oscillator for some samples: `identify`, or one that is given.
+    oscillator : Mode, optional
+        Held against the samples instead of an oscillator that is fitted to them.
     whole : bool
         Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
-    memory : Memory
-        Of the record: how far it stays with which fit is looked for once.
+    quick : bool
+        Compute no misfit of what is refused.
 
     Returns
     -------
@@ -118,32 +118,25 @@ def find_described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    quick = partial(fitter, quick=True)
     up_to_td = Span(bounds.start, _mark(td, bounds))
-    reach = partial(_find_reach_of_fit, history, bounds, memory or Memory())
     refused = {}
     for window in _list_windows_around(td, bounds, whole=whole):
-        span, fit = _grow_span(
-            history, td, window, bounds, fitter if window == up_to_td else quick, reach
-        )
+        quickly = quick or window != up_to_td
+        span, fit = _grow_span(history, td, window, bounds, oscillator, quick=quickly)
         if span:
             return span, fit
         refused[window] = fit
     return None, refused[up_to_td]
 
 
-def most_described(
-    history: History,
-    bounds: Span,
-    fitter: Fitter = identify,
-    *,
-    whole: bool = False,
-    memory: Memory | None = None,
+@remember
+def find_longest_described(
+    history: History, bounds: Span, whole: bool
 ) -> tuple[Span, Identification] | None:
     """Find a window with most of the ``bounds`` that one oscillator describes; None if none is found.
 
     It is that of any td in it, whichever is asked for.  Since it holds the middle of the bounds, it is looked for
-    there.  One that is not found is found from its td.  Parameters as for `described_span`.
+    there.  One that is not found is found from its td.  ``whole`` as for `find_described_span`.
     """
     start, end = bounds
     middle = (start + end) / 2
@@ -153,31 +146,49 @@ def most_described(
         beginnings.append(_mark(middle - _BEGINNINGS[0] * (middle - start), bounds))
         ends.append(_mark(middle + _ENDS[0] * (end - middle), bounds, 1))
     windows = [Span(*window) for window in product(beginnings, ends)]
-    reach = partial(_find_reach_of_fit, history, bounds, memory or Memory())
     for window in sorted(windows, key=lambda one: one.start - one.end):
-        span, fit = _grow_span(history, middle, window, bounds, fitter, reach)
+        span, fit = _grow_span(history, middle, window, bounds, None, quick=True)
         if span and span.end - span.start >= _MOST_OF_BOUNDS * (end - start):
             return span, fit
     return None
 
 
-def _find_reach_of_fit(
-    history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification
+def fit_window(
+    history: History, window: Span, oscillator: Mode | None = None, *, quick: bool
+) -> Identification:
+    """Fit an oscillator to the states in a window, or hold a given one against them; ``quick`` as for `identify`."""
+    time, _ = history.between(*window)
+    return _fit_states(history, get_ends(time), oscillator, quick)
+
+
+@remember
+def _fit_states(
+    history: History, ends: tuple[float, ...], oscillator: Mode | None, quick: bool
+) -> Identification:
+    """Fit the states between two of them, by their times; there are none if ``ends`` is empty."""
+    time, energy = history.between(*(ends or _NO_STATE))
+    if oscillator is not None:
+        return judge_given(oscillator, time, energy, quick=quick)
+    return identify(time, energy, quick=quick, rates=_find_rates(history, ends))
+
+
+@remember
+def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex128]:
+    """Return the rates that the energies between two states show; quick and full fits share them."""
+    return find_rates(*history.between(*(ends or _NO_STATE)))
+
+
+def _find_reach(
+    history: History, bounds: Span, anchor: float, fit: Identification
 ) -> Span | None:
     """Return the span of a fit, extended from the middle of its window if the anchor lies in that window.
 
     Many td share one span; starting from the middle of the window gives all of them the same span.
     """
-    key = (fit.mode, fit.rms, fit.structure, bounds)
-    middle = (fit.start + fit.end) / 2
-    span = memory.once(
-        ("span", *key, middle), lambda: find_span(history, middle, fit, bounds)
-    )
+    span = find_span(history, (fit.start + fit.end) / 2, fit, bounds)
     if span is not None and span.start <= anchor <= span.end:
         return span
-    return memory.once(
-        ("span", *key, anchor), lambda: find_span(history, anchor, fit, bounds)
-    )
+    return find_span(history, anchor, fit, bounds)
 
 
 def find_span(
@@ -188,23 +199,36 @@ def find_span(
     It ends where the energy drifts off the fit; None if it is off at the anchor itself.
     """
     assert fit.mode is not None
+    return _find_span_of_mode(history, anchor, bounds, fit.mode, fit.rms, fit.structure)
+
+
+@remember
+def _find_span_of_mode(
+    history: History,
+    anchor: float,
+    bounds: Span,
+    mode: Mode,
+    rms: float,
+    structure: float,
+) -> Span | None:
+    """Find the window around ``anchor`` in which the record follows a mode with this misfit."""
     time, energy = history.between(*bounds)
-    period = 2 * np.pi / fit.mode.omega
+    period = 2 * np.pi / mode.omega
     typical = float(
         np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2]
     )
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
-    room = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
+    room = max(_ERRORS_OFF * rms / np.sqrt(width), _STRUCTURES_OFF * structure)
     middle = int(np.searchsorted(time, anchor))
     states_behind = width // 2
     ahead = (width - 1) // 2
     first_after = _find_first_off(
-        time, energy, fit.mode, room, middle, states_behind, ahead
+        time, energy, mode, room, middle, states_behind, ahead
     )
     last_before = _find_first_off(
         time[::-1],
         energy[::-1],
-        fit.mode,
+        mode,
         room,
         time.size - middle,
         ahead,
@@ -315,11 +339,12 @@ def _grow_span(
     td: float,
     window: Span,
     bounds: Span,
-    fitter: Fitter,
-    reach: Reach,
+    oscillator: Mode | None,
+    *,
+    quick: bool,
 ) -> tuple[Span | None, Identification]:
-    """Fit a window, extend it while the record follows the fit, and repeat until it no longer changes."""
-    fit = fitter(*history.between(*window))
+    """Fit the window, extend it while the record follows the fit, refit, and repeat until it no longer changes."""
+    fit = fit_window(history, window, oscillator, quick=quick)
     span = window
     for _ in range(_MOST_REFITS):
         if not fit.follows or fit.mode is None:
@@ -330,16 +355,17 @@ def _grow_span(
         )
         # for a period much longer than the record, means would need far more samples than exist
         possible = shortest <= bounds.end - bounds.start
-        grown = reach(min(td, window.end), fit) if possible else None
+        anchor = min(td, window.end)
+        grown = _find_reach(history, bounds, anchor, fit) if possible else None
         if grown is None or grown.end - grown.start < shortest:
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
             if not fit.describes_record:  # for example because the window is too short
                 return None, fit
-            return _clear_ends(history, grown, fit, bounds, fitter, reach)
+            return _clear_ends(history, grown, fit, bounds, oscillator, quick=quick)
         span = grown
-        fit = fitter(*history.between(*span))
+        fit = fit_window(history, span, oscillator, quick=quick)
     return (span, fit) if fit.describes_record else (None, fit)
 
 
@@ -348,8 +374,9 @@ def _clear_ends(
     span: Span,
     fit: Identification,
     bounds: Span,
-    fitter: Fitter,
-    reach: Reach,
+    oscillator: Mode | None,
+    *,
+    quick: bool,
 ) -> tuple[Span, Identification]:
     """Fit the window again without half a period at the ends where the record leaves it.
 
@@ -364,27 +391,11 @@ def _clear_ends(
     )
     if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
         return span, fit
-    core = fitter(*history.between(*inner))
+    core = fit_window(history, inner, oscillator, quick=quick)
     if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
         return span, fit
-    return reach((inner.start + inner.end) / 2, core) or span, core
-
-
-class Fits(Memory):
-    """Cache of fits to windows of one record by one set of rules, and of other results in these windows."""
-
-    def remembered(self, name: str, fitter: Fitter) -> Fitter:
-        """Return a fitter that behaves like ``fitter`` under its name, but fits each window only once."""
-
-        def fit(
-            time: Samples, energy: Samples, *, quick: bool = False
-        ) -> Identification:
-            return self.once(
-                (name, quick, *get_ends(time)),
-                lambda: fitter(time, energy, quick=quick),
-            )
-
-        return fit
+    middle = (inner.start + inner.end) / 2
+    return _find_reach(history, bounds, middle, core) or span, core
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> float:

@@ -26,8 +26,8 @@ from d2rpick.histories.opening import open_run
 from d2rpick.rules.judgement import find_faults
 from tests import paper
 from tests.command import BOX as T01, ENERGY, GLSTAT
-from tests.counted_fits import CountedFits
 from tests.energies import (
+    count_fits,
     list_codes,
     make_energy_history,
     make_vibration_energy,
@@ -301,15 +301,53 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
     )
 
 
-def test_too_few_states_per_period_recommend_nothing() -> None:
+def make_coarse_history(rate: float) -> History:
+    """Return the energy of a damped mode, 44 states in a period at a rate of 1."""
     time = np.linspace(0, 10, 141)
-    history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
-    answer = suggest_in_history(
-        history, 8.0, Settings()
-    )  # 6 states in each period of the energy
+    return make_energy_history(np.exp(-0.05 * time) * np.sin(rate * time) ** 2, time)
+
+
+@pytest.mark.parametrize("rate", [20.0, 21.5])
+def test_too_few_states_per_period_are_not_to_be_used(rate: float) -> None:
+    answer = suggest_in_history(make_coarse_history(rate), 8.0, Settings())
     assert answer.situation.basis == "energy"
-    assert answer.recommended is None
-    assert any("states per period" in note for note in answer.candidates[0].notes)
+    quality = require(answer.quality)
+    assert quality.grade == "poor"
+    assert any("states per period" in reason for reason in quality.reasons)
+
+
+def test_fewer_states_per_period_never_tell_more() -> None:
+    """A mode of 9 states per period is graded like one of half as many."""
+    time = np.linspace(0, 10, 211)
+    history = make_energy_history(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
+    thinned = make_energy_history(history.energy[::2], time[::2])
+    fine, coarse = (
+        suggest_in_history(run, 8.0, Settings()) for run in (history, thinned)
+    )
+    assert require(fine.quality).grade == require(coarse.quality).grade
+    assert abs(require(fine.recommended).tr - require(coarse.recommended).tr) < 0.01
+
+
+@pytest.mark.parametrize("rate", [7.3, 14.6, 18.0])
+def test_lines_need_fewer_states_per_period_than_a_level(rate: float) -> None:
+    """6, 3 and 2.4 states in a period of the energy, of which an oscillator or a level needs 10."""
+    td, damping = 8.0, 0.025
+    answer = suggest_in_history(make_coarse_history(rate), td, Settings())
+    assert answer.situation.basis == "modal"
+    tr = require(answer.recommended).tr
+    pair = next(candidate for candidate in answer.candidates if candidate.tr == tr)
+
+    def compute_position(time: float) -> float:
+        return float(np.exp(-damping * time) * np.sin(rate * time))
+
+    speed = np.exp(-damping * td) * (
+        rate * np.cos(rate * td) - damping * np.sin(rate * td)
+    )
+    kinetic = (speed / np.hypot(rate, damping)) ** 2
+    lack = (compute_position(pair.tr) - compute_position(td)) ** 2
+    true = np.sqrt((lack + kinetic) / (compute_position(td) ** 2 + kinetic))
+    assert require(pair.residual) == pytest.approx(true, abs=5e-3)
+    assert require(pair.residual_low) <= true <= require(pair.residual_high)
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:
@@ -345,10 +383,10 @@ def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
 
 
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
-    reference, fits = read_reference([T01], BOX), CountedFits()
-    box = suggest_in_run(reference, 0.37, PLAIN, fits=fits)
-    fits_made = fits.computed
-    assert fits_made > 0
+    reference = read_reference([T01], BOX)
+    box = suggest_in_run(reference, 0.37, PLAIN)
+    results_before = count_fits(box.situation.history)
+    assert results_before > 0
     judge = partial(verify_run, reference, settings=PLAIN, earlier=box.situation)
     assert print_judged_card(
         [require(box.recommended)[:2]],
@@ -356,4 +394,4 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
         judge,
         complete_printing(Printing(solver="ls-dyna"), box.situation.history),
     )
-    assert fits.computed == fits_made
+    assert count_fits(box.situation.history) == results_before

@@ -13,10 +13,14 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration import measures
 from d2rpick.vibration.oscillator import to_mode
-from d2rpick.vibration.span import Fits
 from tests import chain, paper
-from tests.counted_fits import CountedFits
-from tests.energies import make_energy_history, read_rollover, require
+from tests.energies import (
+    count_fits,
+    forget,
+    make_energy_history,
+    read_rollover,
+    require,
+)
 from tests.reading import read
 
 PLAIN = Settings()
@@ -76,8 +80,8 @@ def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
     history = read(
         ["sample_data/rollover_box.matsum"], Selection(parts=("all",))
     ).history
-    fits, settings = Fits(), Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
-    situations = {td: examine_td(history, td, settings, fits) for td in order}
+    settings = Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
+    situations = {td: examine_td(history, td, settings) for td in order}
     assert len({situation.flight[:2] for situation in situations.values()}) == 1
     open_ = {
         td: situation.bodies.unknown
@@ -119,12 +123,13 @@ def test_what_was_found_with_another_end_of_the_load_changes_nothing(
     history: History, td: float
 ) -> None:
     """A plan remembers results for all flights, and only one flight has the given end of the load."""
-    fits, fresh = Fits(), suggest_in_history(history, td, PLAIN).candidates[:]
+    fresh = suggest_in_history(forget(history), td, PLAIN).candidates[:]
+    history = forget(history)
     other_candidates = suggest_at(
-        examine_td(history, td, Settings(after=0.6 * td), fits)
+        examine_td(history, td, Settings(after=0.6 * td))
     ).candidates[:]
     assert other_candidates != fresh
-    assert suggest_at(examine_td(history, td, PLAIN, fits)).candidates[:] == fresh
+    assert suggest_at(examine_td(history, td, PLAIN)).candidates[:] == fresh
 
 
 def make_one_mode() -> History:
@@ -144,17 +149,17 @@ def make_one_mode() -> History:
 def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> (
     None
 ):
-    history, fits = make_one_mode(), CountedFits()
-    first = examine_td(history, 0.6, PLAIN, fits, quick=True)
-    fits_made = fits.computed
-    quick = examine_td(history, 0.8, PLAIN, fits, quick=True)
-    assert fits.computed == fits_made
+    history = make_one_mode()
+    first = examine_td(history, 0.6, PLAIN, quick=True)
+    fits_made = count_fits(history)
+    quick = examine_td(history, 0.8, PLAIN, quick=True)
+    assert count_fits(history) == fits_made
     assert quick.sees_as(first)
-    anew = examine_td(history, 0.8, PLAIN)
+    anew = examine_td(forget(history), 0.8, PLAIN)
     assert (quick.basis, quick.flight) == (anew.basis, anew.flight)
     assert quick.kinetic_share == pytest.approx(anew.kinetic_share, rel=1e-9)
     assert (
-        examine_td(history, 0.05, PLAIN, fits, quick=True).evidence.span
+        examine_td(history, 0.05, PLAIN, quick=True).evidence.span
         != first.evidence.span
     )
 

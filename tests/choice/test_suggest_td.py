@@ -23,8 +23,13 @@ from d2rpick.report.suggestion import list_alternatives
 from tests import paper
 from tests.command import ENERGY, ROLLOVER, run, run_json
 from tests.computed import locate_results
-from tests.counted_fits import CountedFits
-from tests.energies import make_energy_history, require, suggest_in_window
+from tests.energies import (
+    count_fits,
+    forget,
+    make_energy_history,
+    require,
+    suggest_in_window,
+)
 from tests.reading import read, read_solved
 
 PLAIN = Settings()
@@ -134,14 +139,14 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> N
     late = Settings(
         after=0.34
     )  # no tr lies between the end of the load and these peaks
-    history, fits = read_rollover_run(), CountedFits()
+    history = forget(read_rollover_run())
     for td in (0.30, 0.3175, 0.335):
-        suggest_at(examine_td(history, td, late, fits))
-        examine_td(history, td, late, fits, quick=True)
-    fits_made = fits.computed
-    assert fits_made > 0
-    assert suggest_in_window(history, (0.30, 0.335), late, fits).recommended is None
-    assert fits.computed == fits_made
+        suggest_at(examine_td(history, td, late))
+        examine_td(history, td, late, quick=True)
+    results_before = count_fits(history)
+    assert results_before > 0
+    assert suggest_in_window(history, (0.30, 0.335), late).recommended is None
+    assert count_fits(history) == results_before
 
 
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:

@@ -28,7 +28,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.td.flights import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
-    SHARE,
+    LEAST_MARGIN,
     changes_momentum_little,
     compute_margin,
     estimate_landing_spread,
@@ -90,7 +90,7 @@ def test_the_landing_moves_by_the_amplitude_over_the_speed(
 def test_the_larger_of_share_and_spread_counts() -> None:
     history, flight = make_flying_oscillator(10.0, 1e-4, 1.0, 2.0)
     assert compute_margin(history, flight)[:2] == (
-        SHARE * require(flight.end),
+        LEAST_MARGIN * require(flight.end),
         "flight",
     )
     history, flight = make_flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
@@ -109,7 +109,7 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
     )
     bare = make_energy_history(history.energy, history.time)
     assert compute_margin(bare, flight) == (
-        SHARE * history.time[-1],
+        LEAST_MARGIN * history.time[-1],
         "flight",
         None,
         None,
@@ -126,9 +126,14 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
         spread + drift / speed, rel=1e-6
     )
     assert estimate_landing_spread(history, flight, None) == spread
+    for turning in (2.0, -0.5 * speed):  # the rotation moves the surface that touches
+        moved = estimate_landing_spread(history, flight, drift, turning)
+        assert moved == pytest.approx(spread + drift / (speed + turning), rel=1e-6)
+    receding = estimate_landing_spread(history, flight, drift, -speed)
+    assert receding == pytest.approx(spread + drift / speed, rel=1e-6)
     margin_kept = compute_margin(history, flight, place=drift)
     assert margin_kept.time == max(
-        SHARE * require(flight.end), require(margin_kept.spread)
+        LEAST_MARGIN * require(flight.end), require(margin_kept.spread)
     )
 
 

@@ -113,6 +113,11 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     assert len(card.notes) == (
         solver in ("radioss-sensors", "radioss-contact")
     )  # one step for the whole run
+    of_one_step = [
+        " ".join(content.split("\n# ")).count("cycles at least")
+        for content in card.files.values()
+    ]
+    assert sum(of_one_step) == len(card.notes)
     assert all(content in card.text for content in card.files.values())
     assert hasattr(ALL, SOLVERS[solver].switches)
     assert all(hasattr(ALL, name) for name in SOLVERS[solver].takes)

@@ -78,6 +78,7 @@ def make_placement(positions: Samples = PLACES) -> Placement:
                 for i, position in enumerate(positions)
             },
             watched_centre=lambda _parts: LOOKED_AT,
+            find_nodes=lambda _parts: positions[:ENGINE],
             hanging_together=lambda parts: frozenset(parts) - {ENGINE + 1},
         ),
     )
@@ -143,9 +144,9 @@ def test_angle_and_place_are_those_of_the_two_motions(
 
 
 @cache
-def make_body_with_sliding_engine() -> Samples:
+def make_body_with_sliding_engine(amplitude: float = 0.02) -> Samples:
     """Return a body whose engine slides while the body rotates about its long axis."""
-    slide = np.array([0.0, 0.0, 0.02])
+    slide = np.array([0.0, 0.0, amplitude])
     frames = integrate_rotation(
         np.array([900.0, 0.0, 0.0]), lambda t: slide * np.sin(94.0 * t), TIME, np.eye(3)
     )
@@ -187,6 +188,27 @@ def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -
         None,
         None,
     ]
+
+
+@pytest.mark.parametrize(
+    "direction", [(0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (0.0, 0.6, 0.8), (1.0, 0.0, 0.0)]
+)
+def test_the_speed_at_the_front_is_that_of_the_node_that_is_farthest_along(
+    direction: tuple[float, float, float],
+) -> None:
+    """Against the centre of mass, in the last tenth of the flight from 0.01 to 0.1 s; the engine hardly slides."""
+    where = make_body_with_sliding_engine(0.001)
+    centre = np.einsum("p,npi->ni", MASSES / MASSES.sum(), where)
+    ways = (where - centre[:, np.newaxis])[:, :ENGINE] @ np.array(direction)
+    early, late = (int(np.searchsorted(TIME, time)) for time in (0.091, 0.1))
+    front = int(np.argmax(ways[late]))
+    expected = (ways[late, front] - ways[early, front]) / (TIME[late] - TIME[early])
+    turning = require(require(find_drift_and_turn(where, make_placement())).turning)
+    largest = float(np.linalg.norm(turning.rate) * np.linalg.norm(PLACES, axis=1).max())
+    assert largest > 0.1
+    assert turning.compute_speed_at_front(np.array(direction)) == pytest.approx(
+        expected, abs=0.05 * largest
+    )
 
 
 def test_what_flies_with_a_body_holds_it() -> None:

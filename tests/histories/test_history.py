@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 from numpy.typing import ArrayLike
 
 from d2rpick.base.errors import RangeError
+from d2rpick.base.memory import remember
 from d2rpick.histories.history import History, Precision, Samples
 
 
@@ -82,8 +83,15 @@ def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(
 def test_what_was_found_in_a_record_is_made_once_and_stays_behind_when_it_goes_to_another_process() -> (
     None
 ):
-    record, numbers = history(np.ones(3)), iter((1, 2))
-    assert [record.known.once("one", lambda: next(numbers)) for _ in range(2)] == [1, 1]
-    record.known.once("not for other processes", lambda: lambda: None)
+    numbers = iter(range(10))
+
+    @remember
+    def take_number(_: History, __: str, *, without_effect: int) -> int:  # noqa: ARG001
+        return next(numbers)
+
+    record = history(np.ones(3))
+    assert [take_number(record, "one", without_effect=n) for n in range(2)] == [0, 0]
+    assert take_number(record, "other", without_effect=0) == 1
     sent = pickle.loads(pickle.dumps(record))
-    assert sent.known.once("one", lambda: next(numbers)) == 2
+    assert take_number(sent, "one", without_effect=0) == 2
+    assert take_number(record, "one", without_effect=0) == 0

@@ -77,3 +77,25 @@ def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
         TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME)
     )
     assert require(predict(make_even_grid(TIME, energy))).missed > 0.3
+
+
+@pytest.mark.parametrize("damping", [0.0, 2.0], ids=["weak", "soon gone"])
+def test_a_fast_line_does_not_pass_for_a_slower_one(damping: float) -> None:
+    """Means over blocks of states would show it at a rate that is below their own."""
+    height = 0.01 if damping == 0 else 0.5
+    rates = np.array([20.0, 131.0])
+    fast = height * np.exp(-damping * TIME) * np.cos(rates[1] * TIME + 0.4)
+    energy = 2.0 + np.cos(rates[0] * TIME) + fast
+    lines = require(predict(make_even_grid(TIME, energy))).spectrum.lines
+    heights = np.abs(lines.weights)
+    strongest = np.argsort(-heights)[:2]
+    np.testing.assert_allclose(np.sort(lines.poles.imag[strongest]), rates, rtol=1e-6)
+    np.testing.assert_allclose(np.sort(heights[strongest])[0], height, rtol=1e-4)
+
+
+def test_a_line_that_stands_out_of_the_noise_is_found() -> None:
+    """The prediction gets hardly better by it, since noise is most of what is left."""
+    noise = 0.05 * np.random.default_rng(4).standard_normal(TIME.size)
+    energy = 2.0 + np.cos(20.0 * TIME) + 0.03 * np.cos(31.0 * TIME) + noise
+    lines = require(predict(make_even_grid(TIME, energy))).spectrum.lines
+    assert np.abs(lines.poles.imag - 31.0).min() < 0.05

@@ -13,15 +13,15 @@ from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator_band import residual_band
 from d2rpick.vibration.span import (
-    Fits,
     Span,
     estimate_hidden_share,
     find_described_span,
     find_span,
+    fit_window,
 )
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
-from tests.energies import require
+from tests.energies import forget, require
 from tests.records import (
     ENERGY,
     MODE,
@@ -107,31 +107,27 @@ def test_what_is_accepted_is_the_same_when_refusals_are_quick(noise: float) -> N
     assert (quick.mode, quick.reason, quick.rms) == (thorough.mode, None, thorough.rms)
 
 
-def test_a_window_is_fitted_once_by_each_fitter_and_demand() -> None:
-    fits, calls = Fits(), []
-
-    def counting(
-        time: np.ndarray, energy: np.ndarray, *, quick: bool = False
-    ) -> object:
-        calls.append((time.size, quick))
-        return identify(time, energy, quick=quick)
-
-    fitter = fits.remembered("one", counting)  # type: ignore[arg-type]
-    first = fitter(TIME, ENERGY)
-    assert fitter(TIME, ENERGY) is first
-    fitter(TIME, ENERGY, quick=True)
-    fitter(TIME[1:], ENERGY[1:])
-    fits.remembered("other", counting)(TIME, ENERGY)  # type: ignore[arg-type]
-    assert calls == [(1501, False), (1501, True), (1500, False), (1501, False)]
-    assert fitter(TIME[:0], ENERGY[:0]).reason
+def test_a_window_is_fitted_once_by_each_oscillator_and_demand() -> None:
+    history = make_history(ENERGY)
+    whole = Span(0.0, 0.15)
+    first = fit_window(history, whole, quick=False)
+    assert fit_window(history, Span(-1e-6, 0.15 + 1e-6), quick=False) is first
+    others = (
+        fit_window(history, whole, quick=True),
+        fit_window(history, whole, MODE, quick=False),
+        fit_window(history, Span(TIME[1], 0.15), quick=False),
+    )
+    assert all(other is not first for other in others)
+    assert others[1].mode == MODE
+    assert fit_window(history, Span(0.2, 0.3), quick=False).reason
+    assert fit_window(forget(history), whole, quick=False) is not first
 
 
 def test_what_was_fitted_before_changes_no_answer() -> None:
-    fits = Fits()
+    history = paper.make_history()
     for td in (0.05, paper.TD, 0.1):
         anew, again = (
-            examine_td(paper.make_history(), td, Settings(), fits_before)
-            for fits_before in (None, fits)
+            examine_td(record, td, Settings()) for record in (forget(history), history)
         )
         assert again.evidence.span == anew.evidence.span
         assert require(again.evidence.fit).mode == require(anew.evidence.fit).mode

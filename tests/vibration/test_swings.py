@@ -1,24 +1,23 @@
 """Counting the oscillation cycles of an energy: signs of an integrated motion, or none if a mode may be hidden."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.pair.situation import examine_td
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.question import Settings
 from d2rpick.flight.flight import Flight
-from d2rpick.histories.history import Memory, Samples
+from d2rpick.histories.history import Samples
 from d2rpick.report.situation import list_situation_heading
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.model import Evidence, find_energy_at, model_at
 from d2rpick.vibration.span import Span
 from d2rpick.vibration.swings import Swings, count_swings
+from tests import paper
 from tests.energies import require
 from tests.records import make_table
 
@@ -118,23 +117,22 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
 def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> (
     None
 ):
-    record, memory = (
-        make_table(TIME, integrate_stiffening_spring(1.0, 0.02)[1]),
-        Memory(),
-    )
-    around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
+    energy = integrate_stiffening_spring(1.0, 0.02)[1]
+    record = make_table(TIME, energy)
     together = PartsTogether(record, Flight())
-
-    def find(flight: Span | None, *, doubtful: bool) -> Mapping[str, Any]:
-        return find_models(
-            record, around, flight, settled, lambda: doubtful, memory, together
-        )
-
-    assert not find(None, doubtful=True)
-    assert not find(flight, doubtful=False)
-    swings, again = (find(flight, doubtful=True)["swings"] for _ in range(2))
+    flight, settled = Span(2.0, 28.0), Span(1.0, 28.0)
+    swings, again = (
+        find_models(record, flight, settled, together=together)["swings"]
+        for _ in range(2)
+    )
     assert swings is again
     assert (swings.time[0], swings.time[-1]) == (1.0, 28.0)
+    assert "swings" in examine_td(record, 20.0, Settings(after=2.0)).evidence.models
+    well_known = examine_td(paper.make_history(), paper.TD, Settings())
+    assert not well_known.evidence.models
+    loaded = np.random.default_rng(0).random(TIME.size) * np.exp(TIME / 5)
+    never_flying = examine_td(make_table(TIME, loaded), 20.0, Settings())
+    assert (never_flying.flight.start, never_flying.evidence.models) == (None, {})
 
 
 @pytest.mark.parametrize(

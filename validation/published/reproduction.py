@@ -91,27 +91,29 @@ _PAIR: Final = Kind(
 )
 _ROW: Final = row(
     Field("what", "text"), Field("unit", "text"),
-    Field("published", "number?", "what the paper states; null where it states none"),
-    Field("reference", "number?", "computed in another way, see source"),
+    Field("published", "number?", "value in the paper; null if the paper gives none"),
+    Field("reference", "number?", "reference value, computed in another way (see source)"),
     Field("here", "number"),
-    Field("difference", "number", "here less published, or less reference where nothing is published"),
+    Field("difference", "number", "computed value minus published value; minus the reference value if nothing is "
+                                  "published"),
     Field("tolerance", get_kind("number", minimum=0)),
-    Field("source", "text", "where the published number or the reference value is from"),
-    Field("agrees", "flag", "the difference is within the tolerance"),
+    Field("source", "text", "source of the published value or of the reference value"),
+    Field("agrees", "flag", "true if the difference is within the tolerance"),
     Field("section", get_kind("integer", minimum=1, maximum=5), "section of the paper", later=True),
     Field("figure", "text", "number of the figure in the paper", later=True),
 )  # fmt: skip
 _FIGURE: Final = row(
     Field("name", "text"), Field("title", "text"), Field("section", get_kind("integer", minimum=1, maximum=5)),
-    Field("figure", "text", "number in the paper"),
-    Field("paper", "text", "what the paper shows"),
-    Field("found", "text", "what is found here"),
-    Field("agrees", "flag?", "null where there is nothing to compare"),
-    Field("verdict", one_of(*VERDICTS), "in words; in part: the same only roughly, or only a part of it", later=True),
+    Field("figure", "text", "number of the figure in the paper"),
+    Field("paper", "text", "result in the paper"),
+    Field("found", "text", "result computed here"),
+    Field("agrees", "flag?", "true if the results agree; null if there is nothing to compare"),
+    Field("verdict", one_of(*VERDICTS), "yes, in part or no; in part: the results agree only roughly, or only partly",
+          later=True),
 )  # fmt: skip
 DOCUMENT: Final = Document(
     "d2rpick/reproduce/2",
-    "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
+    "Published and computed results of the floating oscillator; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
         Field("rows", many(_ROW)),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
@@ -21,7 +22,8 @@ from d2rpick.vibration.measures import wrong_sign
 if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.histories.history import Samples
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Samples
 
 # Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
 _KNOWN_WITHIN: Final = 0.1
@@ -152,11 +154,7 @@ def compare_error_with_contact(
     The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
     opposite signs.
     """
-    known, flight = situation.history.known, situation.flight
-    contact = known.once(
-        ("energy of the next contact", flight),
-        lambda: find_energy_of_next_contact(situation),
-    )
+    contact = find_energy_of_next_contact(situation.history, situation.flight)
     if contact is None or situation.at_rest:
         return None
     compared = situation.vibration.compared
@@ -173,16 +171,16 @@ def compare_error_with_contact(
     return Worth(energy / contact, contact)
 
 
-def find_energy_of_next_contact(situation: Situation) -> float | None:
+@remember
+def find_energy_of_next_contact(history: History, flight: Flight) -> float | None:
     """Return the energy that the next contact puts into the parts [energy]; None if no contact is seen.
 
     It is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy of
     the approach at the end of the flight.
     """
-    history = situation.history
-    end = situation.flight.end
+    end = flight.end
     if end is None:
         return None
     _, energies = history.between(end, np.inf)
     rise = float(energies.max(initial=-np.inf)) - history.energy_at(end)
-    return rise if rise > 0 else compute_energy_of_approach(history, situation.flight)
+    return rise if rise > 0 else compute_energy_of_approach(history, flight)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import list_names
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
@@ -15,6 +16,7 @@ from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.model import count_states_of_oscillator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.situation import Situation
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
 
 # Deformation errors within this difference of the smallest are equally good [-]; then the earliest safe tr is chosen.
 EQUALLY_GOOD = 0.02
@@ -67,15 +69,21 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
-    longest, those with a large position error come after the others.  The rest follows by error.
+    longest, those with a large position error come after the others.  Good residuals of modes, which differ at each tr,
+    are of like quality too, except among rigid times within 10 % of the longest.  The rest follows by error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
-    room = np.repeat(
-        [get_limit_of_like_quality(situation) for situation in judged.situations], 3
-    )
+    situations = judged.situations
+    room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
+    alike = np.repeat([_get_limit_of_alike(each) for each in situations], 3)
     rows = order_by_quality(
-        group, judged.error, judged.columns["rigid_time"], judged.out_of_place, room
+        group,
+        judged.error,
+        judged.columns["rigid_time"],
+        judged.out_of_place,
+        room,
+        alike,
     )
     is_kept = judged.kept[rows]
     for situation, (first, last) in zip(
@@ -96,31 +104,46 @@ def get_limit_of_like_quality(situation: Situation) -> float:
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
+def _get_limit_of_alike(situation: Situation) -> float:
+    """Return the error up to which all pairs are of like quality [-].
+
+    R of many modes is another one at each tr.  A residual far below that of a good pair is worth less than a longer
+    rigid time.
+    """
+    return MOST_GOOD if situation.basis == "modal" else 0.0
+
+
 def order_by_quality(
     group: NDArray[np.int32],
     error: Samples,
     rigid: Samples,
     is_off: NDArray[np.bool_],
     room: Samples,
+    alike: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of candidates by group: in each group those within ``room`` of the smallest error come first.
+    """Return the order of candidates by group; in each group those of similar quality come first.
 
-    ``room`` has shape (groups,), the other arguments shape (n,).  The errors within ``room`` are ordered by descending
-    rigid time; but among rigid times within 10 % of the longest, those with ``is_off`` come last.  The others follow
-    by error.
+    Their error is within ``room`` of the smallest, or below ``alike``; both have shape (groups,), the other arguments
+    shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
+    ``is_off`` come last, and before these those with an error further than ``room`` from the smallest.  The others
+    follow by error.
     """
     error = np.round(error, _DECIMALS)
-    is_like = (
-        error <= (_find_extremes(np.minimum, group, error, room.size) + room)[group]
-    )
+    smallest = _find_extremes(np.minimum, group, error, room.size)
+    is_like = error <= np.maximum(smallest + room, alike)[group]
     longest = _find_extremes(
         np.maximum, group, np.where(is_like, rigid, -np.inf), room.size
     )
     is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
+    smallest_of_long = _find_extremes(
+        np.minimum, group, np.where(is_long, error, np.inf), room.size
+    )
+    is_worse = is_long & (error > (smallest_of_long + room)[group])
     return np.lexsort(
         (
             -rigid,
             np.where(is_like, -rigid, error),
+            is_worse,
             is_long & is_off,
             is_like & ~is_long,
             ~is_like,
@@ -280,9 +303,12 @@ def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
     elif best.residual > POOR_RESIDUAL:
         causes.append(_describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
-        causes += situation.history.known.once(
-            ("flaws of the energy", situation.flight.start, situation.td),
-            lambda: _list_causes_of_record(situation),
+        fit = situation.evidence.fit
+        causes += _list_causes_of_record(
+            situation.history,
+            situation.flight.start,
+            situation.td,
+            count_states_of_oscillator(situation.history, fit) if fit else None,
         )
     return causes
 
@@ -320,12 +346,18 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     )
 
 
-def _list_causes_of_record(situation: Situation) -> list[Cause]:
-    """Return the causes why the samples of the flight up to td do not show the level."""
-    start = situation.flight.start
-    _, energy = situation.history.between(
-        -np.inf if start is None else start, situation.td
-    )
+@remember
+def _list_causes_of_record(
+    history: History,
+    start: float | None,
+    td: float,
+    states_of_oscillator: float | None,
+) -> tuple[Cause, ...]:
+    """Return the causes why no level can be read from the samples of the flight, from its start up to td.
+
+    ``states_of_oscillator`` is the number of states per period of an oscillator near td, None without one.
+    """
+    _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
         causes.append(
@@ -334,16 +366,17 @@ def _list_causes_of_record(situation: Situation) -> list[Cause]:
                 "name the internal energy with `energy` or `parts`",
             )
         )
-    states = count_states_per_period(energy)
-    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        states_text = f"the record has {states:.2g} states per period"
+    counts = (count_states_per_period(energy), states_of_oscillator)
+    states = min((count for count in counts if count is not None), default=np.inf)
+    if states < MIN_SAMPLES_PER_PERIOD:
+        states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
                 "write the energies more often",
             )
         )
-    return causes
+    return tuple(causes)
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:

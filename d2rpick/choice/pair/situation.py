@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
@@ -11,18 +11,19 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
+from d2rpick.base.memory import remember
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
 from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.histories.digits import sum_times_as_read
-from d2rpick.vibration import find_models
+from d2rpick.vibration import find_models, find_part_signs
 from d2rpick.vibration.identify import (
     MIN_SAMPLES_PER_PERIOD,
     Identification,
     identify,
-    judge_given,
 )
 from d2rpick.vibration.model import (
     Evidence,
@@ -33,12 +34,11 @@ from d2rpick.vibration.model import (
     model_at,
 )
 from d2rpick.vibration.span import (
-    Fits,
     Span,
     estimate_hidden_share,
     find_described_span,
+    find_longest_described,
     find_span,
-    most_described,
 )
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration import SignedModel
 
     Look = Callable[[float], "Situation"]
 
@@ -58,8 +59,6 @@ _SOLVER_ERROR: Final = 1e-5
 _FAINT: Final = 1e-4
 # Rounding: a constant energy may alternate between two printed values, each off by half a digit.
 _QUANTA: Final = 2
-# Share of a flight before the final contact that is not tested, since the contact may have begun [-].
-_BEFORE_CONTACT: Final = 0.03
 
 
 def is_at_rest(
@@ -69,11 +68,12 @@ def is_at_rest(
 
     ``flight`` is (start, end) [time], with end None if it is unknown.  Free flight excites no vibration: whatever
     vibrates in a part of the flight has vibrated from its start.  So the whole flight is tested if its end is known,
-    not only the time up to td.  Plastic work does not matter: the test is on the fluctuation about the level, however
-    high the level is.  With ``deformed`` (a vibration is known) only the test for round-off is made.
+    not only the time up to td, but for the margin in which the contact may have begun.  Plastic work does not matter:
+    the test is on the fluctuation about the level, however high the level is.  With ``deformed`` (a vibration is known)
+    only the test for round-off is made.
     """
     start, end = flight
-    last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
+    last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
@@ -94,9 +94,15 @@ def _find_faint_fluctuation(history: History, start: float) -> float:
     """
     energies = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
-    highest = history.known.once("highest", lambda: find_largest(history.energy))
+    highest = _find_highest_energy(history)
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
+
+
+@remember
+def _find_highest_energy(history: History) -> float:
+    """Return the largest absolute energy of a record [energy]."""
+    return find_largest(history.energy)
 
 
 class AnswerAtTd:
@@ -134,7 +140,7 @@ class AnswerAtTd:
 class Situation:
     """A history for one td [time], with the flight and the vibration around td.
 
-    ``evidence`` describes the vibration that was found, ``fits`` remembers the fits that were tried.
+    ``evidence`` describes the vibration that was found.
     """
 
     history: History
@@ -142,7 +148,6 @@ class Situation:
     settings: Settings
     flight: Flight
     evidence: Evidence
-    fits: Fits = field(default_factory=Fits)
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -201,7 +206,7 @@ class Situation:
     @cached_property
     def expected_margin(self) -> Margin:
         """Margin of a chosen td: the given one, or the time by which the next contact may come earlier."""
-        return find_margin(self.history, self.flight, self.settings, self.fits)
+        return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
     def at_rest(self) -> bool:
@@ -216,7 +221,7 @@ class Situation:
     @cached_property
     def bodies(self) -> Bodies | None:
         """Drift in flight of the rigid bodies that the parts become; None without data of parts."""
-        return find_drift_of_bodies(self.history, self.flight, self.settings, self.fits)
+        return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
         """Return the position error at td of a body frozen at each of ``times`` [length]; NaN if unknown."""
@@ -264,21 +269,46 @@ def examine_td(
     history: History,
     td: float,
     settings: Settings,
-    fits: Fits | None = None,
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and the vibration in it.
+    """Find the flight around ``td`` and the vibration in it; what many td share is computed once for the history.
 
-    ``fits`` are those of an earlier call for the same record with the same settings, except ``after``.  Use ``quick``
-    for a choice among many td: an oscillator that describes most of the record, including td, is not searched again,
-    and the misfit of a refused oscillator is not computed.
+    Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
+    searched again, and the misfit of a refused oscillator is not computed.
 
     Raises
     ------
     RangeError
         If td, ``after`` or the fit window lie outside the record, or the record has fewer than 3 states.
     """
+    _check_times(history, td, settings)
+    seen = find_seen_flight(history, td)
+    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
+    if seen.refusal and seen.flight:
+        fitted_at = (seen.flight.start + seen.flight.end) / 2
+    else:
+        fitted_at = td
+    fit, span = _find_oscillator(history, fitted_at, settings, seen, quick=quick)
+    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
+        history, td, settings, seen
+    )
+    flight = _find_flight_at(history, td, settings, seen, described)
+    is_given = settings.oscillator is not None
+    is_prescribed = is_given or settings.fit_window is not None
+    evidence = Evidence(fit, span, is_given, prescribed=is_prescribed)
+    situation = Situation(history, td, settings, flight, evidence)
+    if not settings.replay:
+        return situation
+    is_flying = seen.flight is not None and not seen.refusal
+    models = _find_other_models(situation, is_flying=is_flying)
+    if models:
+        return replace(situation, evidence=evidence._replace(models=models))
+    return situation
+
+
+def _check_times(history: History, td: float, settings: Settings) -> None:
+    """Raise RangeError for a record with fewer than 3 states, and for times outside the record."""
     if history.time.size < 3:
         if history.time.size == 1:
             count = "1 state was"
@@ -292,78 +322,56 @@ def examine_td(
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
-    seen_evidence = find_seen_flight(history, td)
-    flying = None if seen_evidence.refusal else seen_evidence.flight
-    # if td is in no flight, the oscillator of the nearest flight shows which pairs exist there
-    if seen_evidence.refusal and seen_evidence.flight:
-        at = (seen_evidence.flight.start + seen_evidence.flight.end) / 2
-    else:
-        at = td
-    fits = Fits() if fits is None else fits
-    fit, span = _find_oscillator(
-        history, at, settings, seen_evidence, fits, quick=quick
-    )
-    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
-        history, td, settings, seen_evidence, fits
-    )
-    flight = _find_flight_at(history, td, settings, seen_evidence, described)
-    is_given = settings.oscillator is not None
-    evidence = Evidence(
-        fit, span, is_given, prescribed=is_given or settings.fit_window is not None
-    )
-    situation = Situation(history, td, settings, flight, evidence, fits)
-    if not settings.replay:
-        return situation
+
+
+def _find_other_models(
+    situation: Situation, *, is_flying: bool
+) -> dict[str, SignedModel]:
+    """Find the models of the vibration that are needed beside the oscillator; ``is_flying``: td is seen to fly."""
+    history = situation.history
+    td = situation.td
+    flight = situation.flight
     first = float(history.time[0])
     last = float(history.time[-1])
-    # without evidence of the next contact the time after td is unknown
-    end = flight.end or (last if flying or span else td)
-    around = Span(min(td, first if flight.start is None else flight.start), end)
-    fitted = settled = None
-    if flight.start is not None:
-        fitted = Span(flight.start, flight.end or last)
-        if flight.settled is None:
-            settled = fitted
-        else:
-            settled = fitted._replace(start=flight.settled)
-    if fitted is not None and flight.source == "energy":
+    # without evidence of the next contact nothing is known about the time after td
+    end = flight.end or (last if is_flying or situation.evidence.span else td)
+    start = first if flight.start is None else flight.start
+    around = Span(min(td, start), end)
+    is_guessed = flight.start is not None and flight.source == "energy"
+    if is_guessed:
         # imported here: better evidence does not need it
-        from d2rpick.vibration.modal_span import (
-            get_inner_window,
-        )
+        from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
 
-        inner = get_inner_window(history, fitted)
-        fitted = inner if inner.start < td <= inner.end else fitted
-    models = find_models(
-        history,
-        around,
-        fitted,
-        settled,
-        lambda: is_doubtful(situation.whole),
-        fits,
-        situation.together,
+        around = get_outer_window(history, around)
+    models = find_part_signs(history, around)
+    is_sign_known = any(model.signed for model in models.values())
+    if flight.start is None or is_sign_known or not is_doubtful(situation.whole):
+        return models
+    in_flight = Span(flight.start, flight.end or last)
+    settled = in_flight
+    if flight.settled is not None:
+        settled = in_flight._replace(start=flight.settled)
+    if is_guessed:
+        inner = get_inner_window(history, in_flight)
+        in_flight = inner if inner.start < td <= inner.end else in_flight
+    return models | find_models(
+        history, in_flight, settled, together=situation.together
     )
-    if models:
-        return replace(situation, evidence=evidence._replace(models=models))
-    return situation
 
 
 def make_look(
     history: History,
     settings: Settings,
-    fits: Fits | None = None,
     since: float | None = None,
     *,
     quick: bool = True,
 ) -> Look:
     """Return a function that examines a record at a td, and caches its answer for each td.
 
-    ``fits`` are those of an earlier call with the same settings.  No flight is assumed to begin before ``since``
-    [time].  ``quick`` has the same meaning as in the examination of one td.
+    No flight is assumed to begin before ``since`` [time].  ``quick`` has the same meaning as in the examination of one
+    td.
     """
-    look = partial(
-        examine_td, history, settings=settings, fits=fits or Fits(), quick=quick
-    )
+    look = partial(examine_td, history, settings=settings, quick=quick)
     return cache(look if since is None else lambda td: _limit_start(look(td), since))
 
 
@@ -412,7 +420,6 @@ def _find_oscillator(
     td: float,
     settings: Settings,
     evidence: Seen,
-    fits: Fits,
     *,
     quick: bool,
 ) -> tuple[Identification | None, Span | None]:
@@ -432,31 +439,22 @@ def _find_oscillator(
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return _add_hidden_share(history, fit, fits), span
+        return _add_hidden_share(history, fit), span
     if settings.oscillator:
-        judge = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = find_described_span(
-            history, td, bounds, judge, whole=whole, memory=fits
+            history, td, bounds, settings.oscillator, whole=whole
         )
         return fit, span
-    identify_mode = fits.remembered("one", partial(identify, memory=fits))
-    quickly = partial(identify_mode, quick=True)
-    longest_fit = fits.once(
-        ("most", bounds, whole),
-        lambda: most_described(history, bounds, quickly, whole=whole, memory=fits),
-    )
+    longest_fit = find_longest_described(history, bounds, whole)
     if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
         span, fit = longest_fit
     else:
-        fitter = quickly if quick else identify_mode
-        span, fit = find_described_span(
-            history, td, bounds, fitter, whole=whole, memory=fits
-        )
-    return _add_hidden_share(history, fit, fits), span
+        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
+    return _add_hidden_share(history, fit), span
 
 
 def _find_window_of_modes(
-    history: History, td: float, settings: Settings, evidence: Seen, fits: Fits
+    history: History, td: float, settings: Settings, evidence: Seen
 ) -> Described | None:
     """Return a window described by modes if only the energy can show a flight, otherwise None."""
     if evidence.flight or evidence.refusal or not settings.replay:
@@ -472,26 +470,27 @@ def _find_window_of_modes(
         guess = None
     else:
         guess = Span(quiet.start, last if quiet.end is None else quiet.end)
-    described = find_described(history, td, guess, fits)
+    described = find_described(history, td, guess)
     if described is None:
         return None
     return Described(*described.span, described.vibration.vibration_energy)
 
 
-def _add_hidden_share(
-    history: History, fit: Identification, fits: Fits
-) -> Identification:
-    """Add to an accepted fit the energy share of a further mode that its misfit may hide."""
+def _add_hidden_share(history: History, fit: Identification) -> Identification:
+    """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    window = history.between(fit.start, fit.end)
-    mode = fit.mode
+    return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
 
-    def add_share() -> Identification:
-        share = estimate_hidden_share(*window, mode)
-        return fit._replace(hidden_share=max(fit.hidden_share, share))
 
-    return fits.once(("hidden", fit.start, fit.end, fit.rms), add_share)
+@remember
+def _estimate_what_is_hidden(
+    history: History, start: float, end: float, _: float, *, fit: Identification
+) -> Identification:
+    """Return a fit with the hidden share; one fit has one result, by which situations see that they share it."""
+    assert fit.mode is not None
+    share = estimate_hidden_share(*history.between(start, end), fit.mode)
+    return fit._replace(hidden_share=max(fit.hidden_share, share))
 
 
 def _skip_first_quarter(

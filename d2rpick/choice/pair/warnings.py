@@ -13,6 +13,7 @@ import numpy as np
 from d2rpick.base.errors import Caution, list_names, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.few_states import warn_about_few_states
+from d2rpick.choice.parts.margins import compute_turning_speed
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import compute_margin
 from d2rpick.histories.digits import (
@@ -238,8 +239,9 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     )
     if worst.assumed and situation.settings.bodies is None:
         assumption += ", which `deck` tells"
+    turning = compute_turning_speed(situation.history, situation.flight, bodies)
     contact = compute_margin(
-        situation.history, situation.flight, place=worst.error
+        situation.history, situation.flight, place=worst.error, turning=turning
     ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
     yield Caution(

@@ -6,52 +6,68 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.margin import Margin, compute_margin
+from d2rpick.base.memory import remember
+from d2rpick.flight.margin import (
+    Margin,
+    compute_margin,
+    find_direction_of_approach,
+)
 
 if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
+    from d2rpick.deck.geometry import Placement
     from d2rpick.flight.flight import Flight
-    from d2rpick.flight.position_error import Bodies
+    from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
-    from d2rpick.vibration.span import Fits
 
 # Number of times in a flight at which a body is tried as frozen: its inner motion is slow.
 _TIMES: Final = 100
 
 
 def find_drift_of_bodies(
-    history: History, flight: Flight, settings: Settings, fits: Fits | None = None
+    history: History, flight: Flight, settings: Settings
 ) -> Bodies | None:
-    """Return the drift of the rigid bodies of the parts in a flight, computed once; None without data of parts."""
+    """Return the drift of the rigid bodies of the parts in a flight; None without data of parts."""
     if flight.parts is None:
         return None
-    # imported here: tables have no parts
+    return _compute_drift(history, flight, settings.bodies, settings.placement)
+
+
+@remember
+def _compute_drift(
+    history: History,
+    flight: Flight,
+    rigid_bodies: tuple[RigidBody, ...] | None,
+    placement: Placement | None,
+) -> Bodies:
+    """Return the drift of the rigid bodies of the parts in a flight."""
+    # imported here: a table has no parts
     from d2rpick.flight.position_error import (
         find_bodies_in_flight,
     )
 
-    memory = history.known if fits is None else fits
-    rigid_bodies = settings.bodies
-    placement = settings.placement
-    return memory.once(
-        ("drift", flight, rigid_bodies),
-        lambda: find_bodies_in_flight(history, flight, rigid_bodies, placement),
-    )
+    return find_bodies_in_flight(history, flight, rigid_bodies, placement)
 
 
-def find_margin(
-    history: History, flight: Flight, settings: Settings, fits: Fits | None = None
-) -> Margin:
+def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
     """Return the given margin, or the time by which switching in the flight may make the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
-    bodies = find_drift_of_bodies(history, flight, settings, fits)
-    position_error = (
-        None
-        if bodies is None
-        else _find_largest_position_error(bodies, flight.start, flight.end)
-    )
-    return compute_margin(history, flight, place=position_error)
+    bodies = find_drift_of_bodies(history, flight, settings)
+    if bodies is None:
+        return compute_margin(history, flight)
+    position_error = _find_largest_position_error(bodies, flight.start, flight.end)
+    turning = compute_turning_speed(history, flight, bodies)
+    return compute_margin(history, flight, place=position_error, turning=turning)
+
+
+def compute_turning_speed(history: History, flight: Flight, bodies: Bodies) -> float:
+    """Return what the rotation of the bodies adds to their speed towards a contact where they touch [length/time].
+
+    0 if the momenta do not show a direction, or no deck shows how the bodies turn.
+    """
+    direction = find_direction_of_approach(history, flight)
+    return 0.0 if direction is None else bodies.compute_speed_at_front(direction)
 
 
 def _find_largest_position_error(

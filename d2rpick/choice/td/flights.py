@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.span import Fits
 
 # Positions in the record at which a vibration without contacts is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
@@ -26,7 +25,6 @@ _NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be 
 def find_longest_flight(
     history: History,
     settings: Settings,
-    fits: Fits | None = None,
     *,
     otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
@@ -40,7 +38,7 @@ def find_longest_flight(
     RangeError
         If there is no flight and no ``otherwise``.
     """
-    flights = find_flights(history, settings, fits)
+    flights = find_flights(history, settings)
     if settings.landing is not None:
         last = _find_last_before(settings.landing, flights)
         if last:
@@ -64,7 +62,7 @@ def find_longest_flight(
         windows,
         key=lambda window_and_flight: window_and_flight[0][1] - window_and_flight[0][0],
     )
-    latest = compute_last_td(end, find_margin(history, longest, settings, fits).time)
+    latest = compute_last_td(end, find_margin(history, longest, settings).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
 
@@ -73,10 +71,8 @@ def compute_last_td(end: float, margin: float) -> float:
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
-def find_flights(
-    history: History, settings: Settings, fits: Fits | None = None
-) -> tuple[Flight, ...]:
-    """Find all flights of a record in ascending order; a given landing ends the flight before it.
+def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
+    """Find all flights of a record, ascending in time; the flight of a given landing ends there.
 
     Parameters
     ----------
@@ -84,8 +80,6 @@ def find_flights(
         With its evidence, as a run provides it.
     settings : Settings
         Options for the search for an oscillator if no better evidence shows a flight.
-    fits : Fits, optional
-        Fits of an earlier call for the record; no window is fitted twice.
 
     Returns
     -------
@@ -102,30 +96,27 @@ def find_flights(
         return _add_given_start(
             history,
             settings,
-            _find_flights_without_landing(history, settings, fits),
-            fits,
+            _find_flights_without_landing(history, settings),
         )
     history.check(landing, argument="landing")
-    flights = _find_flights_without_landing(
-        history, replace(settings, landing=None), fits
-    )
+    flights = _find_flights_without_landing(history, replace(settings, landing=None))
     last = _find_last_before(landing, flights)
     if last and landing <= last.within(history.time)[1]:
         flights = tuple(
             flight._replace(end=landing) if flight is last else flight
             for flight in flights
         )
-        return _add_given_start(history, settings, flights, fits)
+        return _add_given_start(history, settings, flights)
     from d2rpick.choice.pair.situation import examine_td
 
-    landing_flight = examine_td(history, landing, settings, fits).flight
+    landing_flight = examine_td(history, landing, settings).flight
     if landing_flight.end == landing and not landing_flight.refusal:
         return _insert_flight(history, flights, landing_flight)
     return flights
 
 
 def _add_given_start(
-    history: History, settings: Settings, flights: tuple[Flight, ...], fits: Fits | None
+    history: History, settings: Settings, flights: tuple[Flight, ...]
 ) -> tuple[Flight, ...]:
     """Add the flight that starts at the user-given end of the load, unless a flight contains that time."""
     load_end = settings.after
@@ -137,7 +128,7 @@ def _add_given_start(
 
     end = min((start for start, _ in windows if start > load_end), default=last)
     end = end if settings.landing is None else min(end, settings.landing)
-    given_flight = examine_td(history, (load_end + end) / 2, settings, fits).flight
+    given_flight = examine_td(history, (load_end + end) / 2, settings).flight
     if (
         given_flight.source != "given"
         or given_flight.refusal
@@ -176,7 +167,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 
 
 def _find_flights_without_landing(
-    history: History, settings: Settings, fits: Fits | None
+    history: History, settings: Settings
 ) -> tuple[Flight, ...]:
     """Find the flights by evidence, otherwise by an oscillator or modes, otherwise by quiet times."""
     witnessed = find_all_seen(history)
@@ -197,7 +188,7 @@ def _find_flights_without_landing(
         make_look,
     )
 
-    look = make_look(history, settings, fits)
+    look = make_look(history, settings)
     if settings.replay and not list_witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
         for share in _WHERE_IT_VIBRATES:

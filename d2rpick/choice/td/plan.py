@@ -28,7 +28,6 @@ from d2rpick.choice.switched.switched_run import (
 )
 from d2rpick.choice.td.flights import compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -214,13 +213,12 @@ def plan_run(
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
-    fits = Fits()
-    flights = find_flights(history, settings, fits)
+    flights = find_flights(history, settings)
     # the earlier run may have been switched itself
     earlier = before and find_flights(prepare_switched_history(before, ())[0], settings)
     done_rows = find_done_windows(history, flights, done_times, earlier)
     judged: Iterable[PlannedFlight] = _list_rows(
-        reference, flights, settings, shortest, done_rows, fits
+        reference, flights, settings, shortest, done_rows
     )
     if min_rigid is None:
         judged = _leave_out_short(list(judged))
@@ -239,7 +237,6 @@ def _list_rows(
     settings: Settings,
     shortest: float,
     done_rows: Sequence[DoneWindow],
-    fits: Fits,
 ) -> Iterator[PlannedFlight]:
     """Yield every flight with its window, planned as if it were the first."""
     last = max((done.td for done in done_rows), default=None)
@@ -248,7 +245,7 @@ def _list_rows(
     for number, found_flight in enumerate(flights, start=1):
         flight = _apply_given_start(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
-        margin = find_margin(reference.history, flight, settings, fits)
+        margin = find_margin(reference.history, flight, settings)
         row = PlannedFlight(number, flight, start, end, margin, record, "left-out")
         done_in_flight = [done for done in done_rows if done.flight == found_flight]
         if done_in_flight:
@@ -267,7 +264,7 @@ def _list_rows(
                 )
             )
         else:
-            yield _suggest_window(reference, row, settings, shortest, landed, fits)
+            yield _suggest_window(reference, row, settings, shortest, landed)
         landed = flight.end
 
 
@@ -287,7 +284,6 @@ def _suggest_window(
     settings: Settings,
     shortest: float,
     landed: float | None,
-    fits: Fits,
 ) -> PlannedFlight:
     """Return the row with the suggestion for its flight, which starts after the previous landing.
 
@@ -302,7 +298,7 @@ def _suggest_window(
         flight_settings = replace(flight_settings, landing=None)
     # the energy alone may not show the end of the flight to td, so keep the margin before the listed end
     window = row.start, compute_last_td(row.end, row.margin.time)
-    answer = suggest_in_run(reference, window, flight_settings, since=landed, fits=fits)
+    answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
     row = row._replace(answer=answer)
     if known_flight.start is not None and (

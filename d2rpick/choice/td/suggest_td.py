@@ -25,7 +25,6 @@ from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
 from d2rpick.vibration.measures import kinetic_share, vertices
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -43,6 +42,8 @@ if TYPE_CHECKING:
 _MOST_PEAKS: Final = 12
 # For many modes the smallest residual is searched among windows of at least these shares of the longest one [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
+# Good windows of at least this share of the longest good one save as much; the smallest residual decides then [-].
+_LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
 # Number of td in an even grid: a curve of that many points looks smooth on paper and on a screen.
 STEPS: Final = 200
@@ -135,7 +136,6 @@ def choose_td(
     history: History,
     window: tuple[float, float] | None,
     settings: Settings,
-    fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
@@ -154,9 +154,8 @@ def choose_td(
     RangeError
         If the window lies outside the record, or without one nothing in it shows a flight.
     """
-    fits = fits or Fits()
-    window = window or find_longest_flight(history, settings, fits)
-    look = make_look(history, settings, fits, since)
+    window = window or find_longest_flight(history, settings)
+    look = make_look(history, settings, since)
     situation, inside = find_best_known(look, history, window)
     choose = _choose_by_level if situation.vibration.unknown else _choose_by_residual
     choose = _choose_by_modes if situation.basis == "modal" else choose
@@ -182,7 +181,7 @@ def choose_td(
         else None
     )
     return Chosen(
-        make_look(history, settings, fits, since, quick=False)(td),
+        make_look(history, settings, since, quick=False)(td),
         window,
         inside,
         pair[1] if pair else None,
@@ -417,9 +416,11 @@ def _rate_tr_at(situation: Situation) -> int:
 def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td with the smallest residuals of long windows, for many modes, and the longest acceptable one.
+    """Return the td of a long window with a small residual, for many modes, and the longest acceptable one.
 
-    The energy at td does not matter.  If no long window is good, a shorter good one is used.
+    The energy at td does not matter.  Of good windows the longest one is used, since a smaller residual than a good one
+    is worth less than a longer rigid time; of others the one with the smallest residual.  If no long window is good, a
+    shorter good one is used.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -439,11 +440,21 @@ def _choose_by_modes(
             break
     if not choices[0]:
         return _choose_by_residual(situation, window, look)
-    is_good = any(best.error <= MOST_GOOD for _, best in choices[-1])
-    long = choices[-1] if is_good else choices[0]
-    limit = min(best.error for _, best in long) + get_limit_of_like_quality(situation)
-    alike = _find_longest(pair for pair in long if pair[1].error <= limit)
-    return _get_td(alike), _get_td(_find_longest(choices[0]))
+    good = [pair for pair in choices[-1] if pair[1].error <= MOST_GOOD]
+    longest = _get_td(_find_longest(choices[0]))
+    if good:
+        return _find_best_of_long(good)[0].td, longest
+    least_error = min(best.error for _, best in choices[0])
+    limit = least_error + get_limit_of_like_quality(situation)
+    alike = _find_longest(pair for pair in choices[0] if pair[1].error <= limit)
+    return _get_td(alike), longest
+
+
+def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
+    """Return the choice with the smallest error among those that are hardly shorter than the longest."""
+    longest = max(pair.rigid_time for _, pair in pairs)
+    long = [choice for choice in pairs if choice[1].rigid_time >= _LONG * longest]
+    return min(long, key=lambda choice: (choice[1].error, -choice[1].rigid_time))
 
 
 def _list_times_by_modes(

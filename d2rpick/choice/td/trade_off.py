@@ -31,7 +31,6 @@ from d2rpick.choice.td.suggest_td import (
     round_error,
 )
 from d2rpick.histories.digits import round_as_read
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
@@ -218,21 +217,18 @@ def explore_run(
         If td or the window lies outside the record, or there is no flight and neither of them is given.
     """
     history = reference.history
-    fits = Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or find_longest_flight(
-        history, settings, fits, otherwise=None if td is None else record
+        history, settings, otherwise=None if td is None else record
     )
-    look = make_look(history, settings, fits, since)
+    look = make_look(history, settings, since)
     known_best, inside = find_best_known(look, history, window)
     offered, peaks = list_offered_times(known_best, inside, steps)
     times = offered.tolist() if td is None else [*offered.tolist(), td]
-    suggestion = suggest_in_run(
-        reference, window, settings, fits=fits, since=since, times=times
-    )
+    suggestion = suggest_in_run(reference, window, settings, since=since, times=times)
     chosen = suggestion.recommended.td if suggestion.recommended else None
-    fully = make_look(history, settings, fits, since, quick=False)
+    fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     # the full search gives the reason why there is no oscillator
     situations = [

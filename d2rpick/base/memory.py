@@ -1,0 +1,50 @@
+"""Remember results for a record: a function computes each of them once, and every td that needs it shares it."""
+
+from __future__ import annotations
+
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+    class Remembering(Protocol):
+        """A record with a memory."""
+
+        @property
+        def memory(self) -> Memory:
+            """Results that were computed for this record."""
+
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+class Memory:
+    """Results of remembered functions for one record, by function and arguments.
+
+    It lives as long as the record, which is read anew for each question.  A copy in another process starts empty.
+    """
+
+    def __init__(self) -> None:
+        self.results: dict[tuple[Any, ...], Any] = {}
+
+    def __reduce__(self) -> tuple[type[Memory], tuple[()]]:
+        return type(self), ()
+
+
+def remember(function: _Function) -> _Function:
+    """Return a function that computes each result once for a record.
+
+    The record is the first argument.  The results are kept by the other positional arguments, which must be hashable;
+    what is given by keyword must follow from these, or be without influence on the result.
+    """
+
+    @wraps(function)
+    def recall(record: Remembering, *arguments: Hashable, **others: Any) -> Any:
+        key = (function, *arguments)
+        results = record.memory.results
+        if key not in results:
+            results[key] = function(record, *arguments, **others)
+        return results[key]
+
+    return cast("_Function", recall)

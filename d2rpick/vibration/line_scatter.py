@@ -1,0 +1,146 @@
+"""Propagate the scatter of a record to the residuals that the lines of its energy give.
+
+The lines are the least-squares fit of a sum of decaying waves, so the scatter of the record about them gives the
+covariance of their weights and poles, and the gradient of R^2 by these gives the standard deviation of R^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.caching import cached_property
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.lines import Exponentials, Grid
+    from d2rpick.vibration.midpoint import Reading
+
+# Neighbouring states of the rest hardly share more than this: more would leave no state to average over [-].
+_MOST_SHARED: Final = 0.9
+# Scatter of a rate before anything is fitted, in turns over the record; that of a decay is 1 over the record more than
+# the decay itself, and that of a weight is the weight itself.  Without such bounds noise of a line that the fit made of
+# noise would have no limit.
+_LOOSE_TURNS: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LineScatter:
+    """Scatter of R^2 by a ``reading`` of lines that were fitted to a ``grid``.
+
+    Neighbouring states of the rest share the part ``systematic`` of it [-].
+    """
+
+    reading: Reading
+    grid: Grid
+    systematic: float
+
+    def compute_deviation(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Return the standard deviation of R^2 of pairs of broadcastable times [-]."""
+        tr, td = np.broadcast_arrays(
+            np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64)
+        )
+        gradient = self._compute_gradient(tr.ravel(), td.ravel())
+        deviation = np.linalg.norm(gradient @ self._spread, axis=1)
+        return np.asarray(deviation.reshape(tr.shape))
+
+    @cached_property
+    def _spread(self) -> Samples:
+        """Return a root of the covariance of the parameters, of shape (p, p)."""
+        spectrum = self.reading.spectrum
+        waves = self._scale_by_gain(spectrum.lines)
+        mean = self._scale_by_gain(spectrum.mean)
+        times = self.grid.time
+        design = np.hstack([_differentiate_waves(waves, times), mean.waves(times).real])
+        freedom = max(times.size - design.shape[1], 1)
+        shared = min(self.systematic, _MOST_SHARED)
+        # as many independent states as a first-order autoregression has
+        variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)
+        if variance <= 0:
+            return np.zeros((design.shape[1], 1))
+        loose = self._list_loose_scatters()
+        scaled = design * loose / np.sqrt(variance)
+        # what is fitted and what was known before add up as the inverses of their variances
+        information, directions = np.linalg.eigh(scaled.T @ scaled)
+        roots = directions / np.sqrt(1 + np.maximum(information, 0.0))
+        return np.asarray(roots * loose[:, np.newaxis])
+
+    def _list_loose_scatters(self) -> Samples:
+        """Return the standard deviation of each parameter before anything is fitted, shape (p,)."""
+        spectrum = self.reading.spectrum
+        lines = spectrum.lines
+        sizes = np.maximum(np.abs(lines.weights), self.reading.tiny)
+        decays = np.abs(lines.poles.real) + 1 / self.grid.span
+        rates = np.full(sizes.shape, 2 * np.pi * _LOOSE_TURNS / self.grid.span)
+        of_mean = np.maximum(np.abs(spectrum.mean.weights), self.reading.tiny)
+        return np.concatenate([sizes, sizes, decays, rates, of_mean])
+
+    def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
+        """Return the waves as their means over the blocks of the grid."""
+        return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
+
+    def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
+        """Return the derivatives of R^2 by the parameters, shape (n, p) [1/energy, time/1].
+
+        R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
+        """
+        reading = self.reading
+        lines = reading.spectrum.lines
+        middle = (tr + td) / 2
+        lost = _differentiate_waves(lines, tr) - 2 * _differentiate_waves(lines, middle)
+        lost = lost - _differentiate_coherence(lines, tr, td) * np.tile(
+            reading.is_mode, 4
+        )
+        of_level = np.zeros_like(lost)
+        of_mean = np.zeros((tr.size, reading.spectrum.mean.poles.size))
+        level_of_mean = np.zeros_like(of_mean)
+        if reading.no_static:
+            of_mean += reading.spectrum.mean.waves(tr).real
+            level_of_mean += 2 * reading.spectrum.mean.waves(td).real
+        else:
+            is_mode = np.tile(reading.is_mode, 4)
+            lost = lost * is_mode + _differentiate_level(lines, tr) * is_mode / 2
+            of_level += _differentiate_level(lines, td) * is_mode
+        gradient = np.hstack([lost, of_mean])
+        level_gradient = np.hstack([of_level, level_of_mean])
+        squared = reading.residual_squared(tr, td)
+        level = reading.level(td)
+        return np.asarray(
+            (gradient - (squared - 1)[:, np.newaxis] * level_gradient)
+            / level[:, np.newaxis]
+        )
+
+
+def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
+    """Return the derivatives of the waves at times (n,), shape (n, 4 k).
+
+    They are by the real and imaginary parts of the weights, then by those of the poles.
+    """
+    courses = waves.waves(times)
+    moved = courses * waves.weights * (times - waves.origin)[:, np.newaxis]
+    return np.hstack([courses.real, -courses.imag, moved.real, -moved.imag])
+
+
+def _differentiate_level(waves: Exponentials, times: Samples) -> Samples:
+    """Return the derivatives of H, the sum of twice the size of each decaying wave, shape (n, 4 k)."""
+    return _differentiate_coherence(waves, times, times)
+
+
+def _differentiate_coherence(waves: Exponentials, tr: Samples, td: Samples) -> Samples:
+    """Return the derivatives of C, the sum of 2 |w| exp(Re p m) cos(Im p tau / 2), shape (n, 4 k)."""
+    sizes = np.maximum(np.abs(waves.weights), 1e-300)
+    since_origin = ((tr + td) / 2 - waves.origin)[:, np.newaxis]
+    half_apart = ((td - tr) / 2)[:, np.newaxis]
+    decayed = 2 * np.exp(since_origin * waves.poles.real)
+    cosine = decayed * np.cos(half_apart * waves.poles.imag)
+    sine = decayed * np.sin(half_apart * waves.poles.imag)
+    return np.hstack(
+        [
+            cosine * waves.weights.real / sizes,
+            cosine * waves.weights.imag / sizes,
+            cosine * sizes * since_origin,
+            -sine * sizes * half_apart,
+        ]
+    )
