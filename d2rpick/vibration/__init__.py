@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
+# Models by name, best first.
+MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
+
 
 class VibratingTogether(Protocol):
     """The chosen parts and all parts that vibrate with them in a flight."""
@@ -56,9 +59,6 @@ class VibratingTogether(Protocol):
 
 if TYPE_CHECKING:
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-
-# Models by name, best first.
-MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
 
 
 def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
