@@ -102,7 +102,32 @@ class Program(click.types.StringParamType):
     """A command to be started, or the address of a computing cluster: a settings file must not set either."""
 
 
-class Names(click.types.StringParamType):
+class CompletedText(click.types.StringParamType):
+    """Text that the shell completes from a list of names."""
+
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the names to choose from, each with a description."""
+        return ()
+
+    def shell_complete(
+        self,
+        ctx: click.Context,
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Offer the names with this prefix, without those that a shell would split."""
+        import re
+
+        from click.shell_completion import CompletionItem
+
+        return [
+            CompletionItem(name, help=description)
+            for name, description in self.offer(ctx)
+            if name.startswith(incomplete) and re.fullmatch(r"[\w./-]+", name)
+        ]
+
+
+class Names(CompletedText):
     """Names, separated by semicolons in an environment variable, since labels may contain blanks."""
 
     envvar_list_splitter = ";"
@@ -111,60 +136,45 @@ class Names(click.types.StringParamType):
 class PartNames(Names):
     """Ids and titles of parts, completed from the history on the command line."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the parts of the files on the command line, and the words for several parts."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
+        """Return the parts of the files on the command line, and the words for several parts."""
         run = _open_typed_run(ctx)
         parts = run.parts if run else ()
         words = [
             ("flying", "parts that fly together"),
             ("all", "every part that has energy"),
         ]
-        offered = [
+        return [
             *((str(part.id), part.title) for part in parts),
-            *((p.title, str(p.id)) for p in parts),
+            *((part.title, str(part.id)) for part in parts),
             *words,
         ]
-        return _complete_names(offered, incomplete)
 
 
-class RuleIds(click.types.StringParamType):
+class RuleIds(CompletedText):
     """Ids of the rules of check."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the rules with this prefix and their summaries."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the rules with their summaries."""
         from d2rpick.report.findings import list_rules
 
         rows = (line.split(maxsplit=2) for line in list_rules().split("\n"))
-        return _complete_names(
-            [(id_, summary) for id_, _, summary in rows], incomplete.upper()
-        )
+        return [(rule, summary) for rule, _, summary in rows]
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the rules with this prefix in any case."""
+        return super().shell_complete(ctx, param, incomplete.upper())
 
 
 class ChannelNames(Names):
     """Names of channels, completed from the history on the command line."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the channels of the files on the command line, with underscores for blanks, which are equivalent."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
+        """Return the channels of the files on the command line, with underscores for blanks, which are equivalent."""
         run = _open_typed_run(ctx)
-        return _complete_names(
-            [(name.replace(" ", "_"), "") for name in (run.channels if run else ())],
-            incomplete,
-        )
+        return [(name.replace(" ", "_"), "") for name in (run.channels if run else ())]
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
@@ -183,27 +193,7 @@ def _open_typed_run(ctx: click.Context) -> Run | None:
         return None
 
 
-def _complete_names(
-    offered: Iterable[tuple[str, str]], incomplete: str
-) -> list[CompletionItem]:
-    """Return the names with this prefix, without those that a shell would split."""
-    import re
-
-    from click.shell_completion import CompletionItem
-
-    words = [
-        (name, help_text)
-        for name, help_text in offered
-        if re.fullmatch(r"[\w./-]+", name)
-    ]
-    return [
-        CompletionItem(name, help=help_text)
-        for name, help_text in words
-        if name.startswith(incomplete)
-    ]
-
-
-class SolverName(click.types.StringParamType):
+class SolverName(CompletedText):
     """Name of a solver whose input can be printed; the table of solvers is imported only when it is needed."""
 
     name = "solver"
@@ -224,14 +214,9 @@ class SolverName(click.types.StringParamType):
         """Return the names for the help."""
         return f"[{'|'.join(list_solvers())}]"
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the names with this prefix."""
-        return _complete_names([(name, "") for name in list_solvers()], incomplete)
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the names of the solvers."""
+        return [(name, "") for name in list_solvers()]
 
 
 _NAMED: Final = {

@@ -10,7 +10,11 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.modes import Mode, compute_energy_and_jacobian
+from d2rpick.vibration.modes import (
+    SOLVER_FLOOR,
+    Mode,
+    compute_energy_and_jacobian,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,9 +43,6 @@ MAX_OF_SPRING: Final = (
 _OF_A_PRELOAD: Final = (
     0.03  # share of the vibration energy that increases a residual of 0.2 to 0.4
 )
-
-# The misfit is not compared with smaller vibration energies: solver errors are 1e-5 of the maximum at any time.
-_FLOOR: Final = 1e-4  # of the highest vibration energy
 
 # Free parameters of the models, the simplest first, and the periods that are needed to distinguish the models.
 _MODELS: Final = (
@@ -358,7 +359,7 @@ def _judge_attempt(
         np.hypot.reduce(local) / np.sqrt(s.size)
     )  # the norm avoids the overflow of squares
     # if noise exceeds the vibration, a misfit does not show a further mode
-    np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
+    np.maximum(local, max(rms, SOLVER_FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))
     loose = _explain_misfit(rms / spread, structure / spread, local_structure)
     objection = _explain_implausible(

@@ -28,7 +28,7 @@ from d2rpick.vibration.locked_lines import (
 )
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
-from d2rpick.vibration.swings import SOLVER_FLOOR
+from d2rpick.vibration.modes import SOLVER_FLOOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

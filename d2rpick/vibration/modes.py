@@ -23,6 +23,8 @@ BLOCK: Final = 8192
 # Most steps of the root search; bisection alone reaches rounding with them.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
+# Energies below this share of the highest one may be no vibration: solver errors are 1/10 of it at any time.
+SOLVER_FLOOR: Final = 1e-4
 # A deformation below this share of the amplitude is zero within rounding.
 _ZERO = 1e-9
 

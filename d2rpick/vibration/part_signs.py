@@ -11,8 +11,8 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.measures import Profile
+from d2rpick.vibration.modes import SOLVER_FLOOR
 from d2rpick.vibration.span import SMALLEST, estimate_hidden_share
-from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, find_all_zeros, follow_waves
 
 if TYPE_CHECKING:

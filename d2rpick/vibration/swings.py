@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.measures import Profile, vertices, wrong_sign
+from d2rpick.vibration.modes import SOLVER_FLOOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,9 +39,6 @@ _OF_ANY_SPRING: Final = 2.0
 # but the lower envelope shows only a part of it, 1/6 in one of 300 records of two parts.
 # Of 10,000 random pairs with a second mode 0.1 % exceeded 3 times the root by more than 0.05.
 _OF_THE_FLOOR: Final = 5.0
-
-# Energies below this share of the highest one may be no vibration: solver errors are 1/10 of it at any time.
-SOLVER_FLOOR: Final = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,4 +1,4 @@
-"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
+"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers TABLE``.
 
 Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
 of `deciding_questions` that run through code with this constant are asked again.  The table shows how many answers
@@ -33,6 +33,18 @@ FACTORS: Final = (0.5, 2.0)
 # This number of changed answers shows that a constant decides; no further questions are asked.
 ENOUGH: Final = 3
 
+_INTRODUCTION: Final = """# Numbers that decide
+
+Each numeric constant of `vibration`, `flight` and `choice` was halved and doubled, and the questions that run through
+its users were asked again: one of each kind first, until three answers had changed or the time was over. The questions
+are the frozen answers of the tests, random records of energies, falls, chains and parts, and commands on the samples.
+`python -m tests.benchmarks.deciding_numbers docs/developing/deciding-numbers.md` writes this page. It tries constants
+again that have changed no answer or have another value.
+"""
+_IDLE: Final = """A constant in this table is a guard against round-off, overflow or damaged input, a limit of time or
+memory, a threshold of cases that these questions do not contain, or it is not needed. Ask a question of its own before
+you remove it."""
+
 Number = float | int | tuple[float, ...]
 # A function of a file, by the name of the file and the line of its definition.
 Place = tuple[str, int]
@@ -53,6 +65,20 @@ class Baseline(NamedTuple):
     answer: str
     seconds: float
     places: frozenset[Place]
+
+
+class Row(NamedTuple):
+    """Result for a constant: its name without the package, its value, and the counts of changed answers as text."""
+
+    name: str
+    value: str
+    halved: str
+    doubled: str
+
+    @property
+    def decides(self) -> bool:
+        """Return True if an answer changed."""
+        return any(not text.startswith("0 of") for text in (self.halved, self.doubled))
 
 
 class Outcome(NamedTuple):
@@ -308,18 +334,63 @@ def call_in_child(function: Callable[[], Any]) -> Any:
     return result
 
 
-def print_row(constant: Constant, outcomes: Sequence[Outcome]) -> None:
-    """Print a row of a Markdown table."""
+def count_outcomes(constant: Constant, outcomes: Sequence[Outcome]) -> Row:
+    """Return the row of a constant that was tried."""
     module = constant.module.removeprefix("d2rpick.")
-    value = f"{constant.value}"
     counts = [f"{outcome.changed} of {outcome.asked}" for outcome in outcomes]
-    row = (f"`{module}.{constant.name}`", value, *counts, constant.comment)
-    print("| " + " | ".join(row) + " |", flush=True)
+    return Row(f"{module}.{constant.name}", f"{constant.value}", *counts)
+
+
+def read_table(path: Path) -> dict[str, Row]:
+    """Return the rows of an earlier table by the names of their constants; empty without a table."""
+    rows = {}
+    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        if line.startswith("| `"):
+            rows[cells[0].strip("`")] = Row(cells[0].strip("`"), *cells[1:4])
+    return rows
+
+
+def write_table(
+    path: Path, constants: Sequence[Constant], rows: Mapping[str, Row]
+) -> None:
+    """Write the table of all constants: those that decide an answer, the others, and those that were not tried."""
+    deciding: list[str] = []
+    idle: list[str] = []
+    untried: list[str] = []
+    for constant in constants:
+        name = f"{constant.module.removeprefix('d2rpick.')}.{constant.name}"
+        row = rows.get(name)
+        cells = (f"`{name}`", f"{constant.value}")
+        if row is None:
+            untried.append(_join_cells(*cells, constant.comment))
+            continue
+        line = _join_cells(*cells, row.halved, row.doubled, constant.comment)
+        (deciding if row.decides else idle).append(line)
+    head = _join_cells(
+        "constant", "value", "changed when halved", "when doubled", "what it decides"
+    )
+    tried = [head, "| --- | --- | --- | --- | --- |"]
+    lines = [_INTRODUCTION, f"## {len(deciding)} constants that decide", ""]
+    lines += [*tried, *deciding, "", f"## {len(idle)} that changed no answer", ""]
+    lines += [_IDLE, "", *tried, *idle, "", f"## {len(untried)} not tried", ""]
+    lines += [
+        _join_cells("constant", "value", "what it decides"),
+        "| --- | --- | --- |",
+        *untried,
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _join_cells(*cells: str) -> str:
+    escaped = (cell.replace("|", "\\|") for cell in cells)
+    return f"| {' | '.join(escaped)} |"
 
 
 def main() -> None:
-    """Try each constant, and print the table."""
+    """Try each constant, and write the table."""
     parser = argparse.ArgumentParser(description="Which constants decide an answer.")
+    parser.add_argument("table", type=Path, help="Markdown file; deciding rows stay")
     parser.add_argument("--records", type=int, default=2, help="records of each class")
     parser.add_argument("--seed", type=int, default=1, help="seed of the records")
     parser.add_argument(
@@ -329,36 +400,34 @@ def main() -> None:
     options = parser.parse_args()
     modules = import_modules()
     constants = find_constants(modules)
+    rows = read_table(options.table)
     with TemporaryDirectory() as folder:
         questions = make_questions(options.records, options.seed, Path(folder))
         baselines = call_in_child(lambda: measure_baselines(questions))
-        total = sum(baseline.seconds for baseline in baselines.values())
-        print(
-            f"{len(constants)} constants, {len(questions)} questions, {total:.0f} s\n"
-        )
-        print(
-            "| constant | value | changed when halved | when doubled | what it decides |"
-        )
-        print("| --- | --- | --- | --- | --- |")
         for constant in constants:
             full_name = f"{constant.module}.{constant.name}"
-            if options.names and not any(part in full_name for part in options.names):
+            row = rows.get(full_name.removeprefix("d2rpick."))
+            is_known = row and row.decides and row.value == f"{constant.value}"
+            is_named = not options.names or any(
+                part in full_name for part in options.names
+            )
+            if is_known or not is_named:
                 continue
-            outcomes = [
-                call_in_child(
-                    partial(
-                        try_factor,
-                        modules,
-                        constant,
-                        factor,
-                        questions,
-                        baselines,
-                        options.seconds,
-                    )
+            trials = [
+                partial(
+                    try_factor,
+                    modules,
+                    constant,
+                    factor,
+                    questions,
+                    baselines,
+                    options.seconds,
                 )
                 for factor in FACTORS
             ]
-            print_row(constant, outcomes)
+            row = count_outcomes(constant, [call_in_child(trial) for trial in trials])
+            rows[row.name] = row
+            write_table(options.table, constants, rows)
 
 
 if __name__ == "__main__":

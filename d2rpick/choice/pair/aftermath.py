@@ -16,6 +16,10 @@ import numpy as np
 
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.warnings import (
+    compute_mean_decay,
+    select_energies_in_flight,
+)
 from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
@@ -23,15 +27,13 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History
 
 # Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
 _KNOWN_WITHIN: Final = 0.1
 # Largest number of similar modes with random phases: the energy of m modes has a standard deviation of 1/sqrt(8 m).
 # The nodes of a computed car show 100 such modes.
 _MODES_OUT_OF_STEP: Final = 110
-# Largest exponent of e, near the largest double.
-_LARGEST_EXPONENT: Final = 700.0
 # Means of computed runs exceed the prediction from spectral lines by at most this share [-].
 _OF_SOLVER: Final = 0.005
 # Fewest states that show a fluctuation.
@@ -97,12 +99,9 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     bounds = bound_vibration_energy(situation)
     if bounds is None:
         return []
-    time, energy = _select_energies_in_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
-    # share of the mean vibration energy of the flight that remains at td with damping
-    exponents = -situation.flight.damping * (time - situation.td)
-    decay = np.exp(np.minimum(exponents, _LARGEST_EXPONENT))
-    damping_left = 1 / float(np.mean(decay))
+    damping_left = 1 / compute_mean_decay(situation, time)
     # the mean energy exceeds the static energy by half of the vibration energy
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
@@ -115,7 +114,7 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
 
     No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
     """
-    time, energy = _select_energies_in_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     if time.size < _FEWEST_STATES:
         return None
     since = time - time[0]
@@ -124,15 +123,6 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
     smallest = min(float(np.ptp(swing)), largest)
     return smallest, max(
         smallest, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
-    )
-
-
-def _select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
-    """Return times and energies of the flight, up to td if its end is unknown [time], [energy]."""
-    start = situation.flight.start
-    end = situation.flight.end
-    return situation.history.between(
-        np.inf if start is None else start, situation.td if end is None else end
     )
 
 

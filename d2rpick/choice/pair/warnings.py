@@ -366,14 +366,10 @@ def compute_means(situation: Situation) -> Means | None:
     mean = compute_mean_in_flight(situation)
     if mean is None or not situation.energy_td > 0 or situation.at_rest:
         return None
-    time, energy = _select_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
-    # the remaining decay is 0 if its exponential underflows
-    decay = np.exp(
-        np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
-    )
-    energy_after = resting + (mean - resting) / float(decay.mean())
+    energy_after = resting + (mean - resting) / compute_mean_decay(situation, time)
     if energy_after > round_off(situation.history):
         return Means(mean, lowest, resting, energy_after)
     return None
@@ -407,12 +403,18 @@ def estimate_time_after(
 
 def compute_mean_in_flight(situation: Situation) -> float | None:
     """Return the mean energy of the flight, up to td if its end is unknown [energy]; None unless it is positive."""
-    energy = _select_flight(situation)[1]
+    energy = select_energies_in_flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
     return mean if mean > round_off(situation.history) else None
 
 
-def _select_flight(situation: Situation) -> tuple[Samples, Samples]:
+def compute_mean_decay(situation: Situation, time: Samples) -> float:
+    """Return the mean vibration energy at the times relative to that at td [-], from the damping of the flight."""
+    exponents = -situation.flight.damping * (time - situation.td)
+    return float(np.mean(np.exp(np.minimum(exponents, _LARGEST_EXPONENT))))
+
+
+def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
     start = situation.flight.start
     end = situation.flight.end

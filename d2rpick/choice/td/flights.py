@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Positions in the record at which a vibration without contacts is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
+# Shorter rigid windows, as a share of the record, save less than a restart costs [-].
+MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
 
 

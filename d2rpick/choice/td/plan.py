@@ -26,7 +26,7 @@ from d2rpick.choice.switched.switched_run import (
     find_done_windows,
     prepare_switched_history,
 )
-from d2rpick.choice.td.flights import compute_last_td, find_flights
+from d2rpick.choice.td.flights import MIN_RIGID, compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# Shorter rigid windows, as a share of the record, save less than a restart costs [-].
-MIN_RIGID: Final = 0.05
 # A window is left out for a later one that is longer by more than this factor [-].
 # With the windows w and W one after the other, the next run saves w, and the run after it w + W.
 # The other window alone saves W in both runs, which is more if W > 2 w.

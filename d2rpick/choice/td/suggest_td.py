@@ -19,7 +19,7 @@ from d2rpick.choice.pair.quality import (
 )
 from d2rpick.choice.pair.situation import Situation, make_look
 from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
-from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.flights import MIN_RIGID, find_longest_flight
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -49,8 +49,6 @@ _FEWEST_TD, _MOST_TD = 3, 1000
 STEPS: Final = 200
 # Decimals of an error shown to the user.
 _READ: Final = 3
-# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
-_SHORTEST: Final = 0.05
 # A longer pair is mentioned if it exceeds the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
 # Factor on the spread of the contact time shown by the energy: a constant energy may hide many vibrating modes.
@@ -397,7 +395,7 @@ def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
     if not pairs:
         return []
     record = pairs[0][0].history.time
-    shortest = _SHORTEST * float(record[-1] - record[0])
+    shortest = MIN_RIGID * float(record[-1] - record[0])
     long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
     certainties = [_rate_tr_at(situation) for situation, _ in long]
     return [
