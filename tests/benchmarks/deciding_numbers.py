@@ -1,14 +1,17 @@
 """Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers TABLE``.
 
 Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
-of `deciding_questions` that run through code with this constant are asked again.  The table shows how many answers
-changed.  A constant that changes no answer is not needed, or needs a question of its own.
+of `deciding_questions` that run through code with this constant are asked again, one of each kind first.  The table
+docs/developing/deciding-numbers.csv shows how many answers changed; constants that have changed no answer so far, or
+have another value, are tried again.  A constant that changes no answer is a guard against round-off, overflow or
+damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not needed.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import importlib
 import multiprocessing
 import pkgutil
@@ -33,17 +36,13 @@ FACTORS: Final = (0.5, 2.0)
 # This number of changed answers shows that a constant decides; no further questions are asked.
 ENOUGH: Final = 3
 
-_INTRODUCTION: Final = """# Numbers that decide
-
-Each numeric constant of `vibration`, `flight` and `choice` was halved and doubled, and the questions that run through
-its users were asked again: one of each kind first, until three answers had changed or the time was over. The questions
-are the frozen answers of the tests, random records of energies, falls, chains and parts, and commands on the samples.
-`python -m tests.benchmarks.deciding_numbers docs/developing/deciding-numbers.md` writes this page. It tries constants
-again that have changed no answer or have another value.
-"""
-_IDLE: Final = """A constant in this table is a guard against round-off, overflow or damaged input, a limit of time or
-memory, a threshold of cases that these questions do not contain, or it is not needed. Ask a question of its own before
-you remove it."""
+_HEAD: Final = (
+    "constant",
+    "value",
+    "changed when halved",
+    "changed when doubled",
+    "what it decides",
+)
 
 Number = float | int | tuple[float, ...]
 # A function of a file, by the name of the file and the line of its definition.
@@ -342,55 +341,35 @@ def count_outcomes(constant: Constant, outcomes: Sequence[Outcome]) -> Row:
 
 
 def read_table(path: Path) -> dict[str, Row]:
-    """Return the rows of an earlier table by the names of their constants; empty without a table."""
-    rows = {}
-    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
-        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
-        if line.startswith("| `"):
-            rows[cells[0].strip("`")] = Row(cells[0].strip("`"), *cells[1:4])
-    return rows
+    """Return the tried rows of an earlier table by the names of their constants; empty without a table."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))[1:]
+    return {line[0]: Row(*line[:4]) for line in lines if line[2]}
 
 
 def write_table(
     path: Path, constants: Sequence[Constant], rows: Mapping[str, Row]
 ) -> None:
     """Write the table of all constants: those that decide an answer, the others, and those that were not tried."""
-    deciding: list[str] = []
-    idle: list[str] = []
-    untried: list[str] = []
+    lines = []
     for constant in constants:
         name = f"{constant.module.removeprefix('d2rpick.')}.{constant.name}"
-        row = rows.get(name)
-        cells = (f"`{name}`", f"{constant.value}")
-        if row is None:
-            untried.append(_join_cells(*cells, constant.comment))
-            continue
-        line = _join_cells(*cells, row.halved, row.doubled, constant.comment)
-        (deciding if row.decides else idle).append(line)
-    head = _join_cells(
-        "constant", "value", "changed when halved", "when doubled", "what it decides"
-    )
-    tried = [head, "| --- | --- | --- | --- | --- |"]
-    lines = [_INTRODUCTION, f"## {len(deciding)} constants that decide", ""]
-    lines += [*tried, *deciding, "", f"## {len(idle)} that changed no answer", ""]
-    lines += [_IDLE, "", *tried, *idle, "", f"## {len(untried)} not tried", ""]
-    lines += [
-        _join_cells("constant", "value", "what it decides"),
-        "| --- | --- | --- |",
-        *untried,
-    ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _join_cells(*cells: str) -> str:
-    escaped = (cell.replace("|", "\\|") for cell in cells)
-    return f"| {' | '.join(escaped)} |"
+        row = rows.get(name, Row(name, f"{constant.value}", "", ""))
+        rank = 2 if not row.halved else int(not row.decides)
+        lines.append((rank, [*row, constant.comment]))
+    lines.sort(key=lambda line: line[0])
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_HEAD)
+        writer.writerows(cells for _, cells in lines)
 
 
 def main() -> None:
     """Try each constant, and write the table."""
     parser = argparse.ArgumentParser(description="Which constants decide an answer.")
-    parser.add_argument("table", type=Path, help="Markdown file; deciding rows stay")
+    parser.add_argument("table", type=Path, help="CSV file; deciding rows stay")
     parser.add_argument("--records", type=int, default=2, help="records of each class")
     parser.add_argument("--seed", type=int, default=1, help="seed of the records")
     parser.add_argument(
