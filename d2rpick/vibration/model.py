@@ -91,8 +91,6 @@ class Vibration:
         What the kinetic share is an estimate from, and why; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
-    aliased : bool
-        Whether so few states were written per period that what swings may be faster, and modes are not relied on.
     parts : SignedParts or None
         What single parts tell, also where it is not relied on.
     """
@@ -105,7 +103,6 @@ class Vibration:
     told: str = ""
     estimated: str | None = None
     doubts: tuple[str, ...] = ()
-    aliased: bool = False
     parts: SignedParts | None = None
 
     @property
@@ -451,9 +448,7 @@ def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
         if whole.compared or model.known_at(td):
             return _compare_with_signs(whole, basis, model)
         return _note_sunk(whole)
-    if whole.doubts or whole.aliased:
-        return whole
-    if not is_doubtful(whole) or not model.known_at(td):
+    if whole.doubts or not is_doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
@@ -520,11 +515,11 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
-        # lines need fewer states than a level, and refuse a record that has too few for them
+        # lines need fewer states than a level, and refuse a record that has fewer
+        aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
-            doubts=prescribed,
-            aliased=not evidence.has_sure_modes and _is_aliased(history, fit),
+            doubts=(*prescribed, *aliasing),
         )
     if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
         return samples(
@@ -555,15 +550,14 @@ def describe_energy_at(
     return SampledEnergy(history, td)
 
 
-def count_states_of_oscillator(history: History, fit: Identification) -> float | None:
-    """Return the number of states per period of the energy of a fit near the record; None without such a fit."""
+def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
+    """Return a doubt if the energy swings so fast that its states miss the level as they miss the vibration."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
-        return None
+        return ()
     time, _ = history.between(fit.start, fit.end)
-    return count_samples_per_period(time, fit.mode)
-
-
-def _is_aliased(history: History, fit: Identification) -> bool:
-    """Return True if an oscillator near the record has so few states per period that it may be a faster one."""
-    states = count_states_of_oscillator(history, fit)
-    return states is not None and states < MIN_SAMPLES_PER_PERIOD
+    states = count_samples_per_period(time, fit.mode)
+    if states >= MIN_SAMPLES_PER_PERIOD:
+        return ()
+    return (
+        f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+    )

@@ -308,12 +308,11 @@ def make_coarse_history(rate: float) -> History:
 
 
 @pytest.mark.parametrize("rate", [20.0, 21.5])
-def test_too_few_states_per_period_are_not_to_be_used(rate: float) -> None:
+def test_too_few_states_per_period_recommend_nothing(rate: float) -> None:
     answer = suggest_in_history(make_coarse_history(rate), 8.0, Settings())
     assert answer.situation.basis == "energy"
-    quality = require(answer.quality)
-    assert quality.grade == "poor"
-    assert any("states per period" in reason for reason in quality.reasons)
+    assert answer.recommended is None
+    assert any("states per period" in note for note in answer.candidates[0].notes)
 
 
 def test_fewer_states_per_period_never_tell_more() -> None:

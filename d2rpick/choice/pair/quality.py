@@ -16,7 +16,6 @@ from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
-from d2rpick.vibration.model import count_states_of_oscillator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -303,12 +302,8 @@ def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
     elif best.residual > POOR_RESIDUAL:
         causes.append(_describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
-        fit = situation.evidence.fit
         causes += _list_causes_of_record(
-            situation.history,
-            situation.flight.start,
-            situation.td,
-            count_states_of_oscillator(situation.history, fit) if fit else None,
+            situation.history, situation.flight.start, situation.td
         )
     return causes
 
@@ -348,15 +343,9 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
 
 @remember
 def _list_causes_of_record(
-    history: History,
-    start: float | None,
-    td: float,
-    states_of_oscillator: float | None,
+    history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
-    """Return the causes why no level can be read from the samples of the flight, from its start up to td.
-
-    ``states_of_oscillator`` is the number of states per period of an oscillator near td, None without one.
-    """
+    """Return the causes why no level can be read from the samples of the flight, from its start up to td."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
@@ -366,9 +355,8 @@ def _list_causes_of_record(
                 "name the internal energy with `energy` or `parts`",
             )
         )
-    counts = (count_states_per_period(energy), states_of_oscillator)
-    states = min((count for count in counts if count is not None), default=np.inf)
-    if states < MIN_SAMPLES_PER_PERIOD:
+    states = count_states_per_period(energy)
+    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
         states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
