@@ -263,13 +263,6 @@ class GrowingEvidence:
         )
 
 
-def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
-    """Find all flights of a finished record, as `GrowingEvidence.flights` does."""
-    evidence = GrowingEvidence()
-    evidence.take(history)
-    return evidence.flights(needed)
-
-
 def highest_energy(history: History, start: float, end: float) -> float:
     """Return the state from ``start`` to ``end`` with the highest internal energy, the last of equal ones [time]."""
     time, energy = history.between(start, end)

@@ -89,7 +89,7 @@ def find_stretches(
 def _find_side_lines(
     lines: Exponentials, span: float, scatter: float
 ) -> list[StretchLine]:
-    """Find the lines of modes about stretches that swing.
+    """Find the side lines of modes whose static stretch oscillates.
 
     A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
     their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at

@@ -77,7 +77,7 @@ def is_at_rest(
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
-    # 0 if no energy is written at all, which shows nothing
+    # this is 0 if no energy is written at all
     rounding = round_off(history)
     if rounding > 0 and float(np.abs(inside).max()) <= rounding:
         return True
@@ -132,7 +132,7 @@ class AnswerAtTd:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Share of the vibration energy that no tr saves, K [-]; None on basis ``"energy"`` and at rest."""
+        """Kinetic fraction K at td [-], which no tr preserves; None on basis ``"energy"`` and at rest."""
         return self.situation.kinetic_share
 
 
