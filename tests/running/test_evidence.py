@@ -1,6 +1,6 @@
 """Force-free times, and how long they must last, for computed runs and for synthetic ones of known motion."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -18,7 +18,7 @@ from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import GrowingEvidence, highest_energy
 from d2rpick.running.inner_motion import InnerMotion, Wait
-from d2rpick.running.witness import Needed, Quiet
+from d2rpick.running.witness import Quiet
 from tests.command import ROOT
 from tests.energies import require
 from tests.records import cut_history, make_table
@@ -28,7 +28,9 @@ from tests.running.seen import take_whole_record
 CAR, BOX = "carT01.gz", "drop2T01.gz"
 
 
-def find_quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
+def find_quiet_times(
+    history: History, needed: Callable[[float, float], float | None]
+) -> tuple[Quiet, ...]:
     """Return all flights of a finished record."""
     evidence = GrowingEvidence()
     evidence.take(history)
