@@ -58,7 +58,7 @@ class GrowingEvidence:
         return [*self._of_parts, *self._of_model]
 
     def take(self, states: History) -> None:
-        """Append states; HistoryError if they have other quantities than the states so far."""
+        """Append states, which have the quantities of the states so far."""
         self._record.add(states)
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)

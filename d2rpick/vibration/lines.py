@@ -33,9 +33,9 @@ _BETTER, _OF_A_LINE = 0.97, 16.0
 FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], at most half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
-# States of the even grid per period of the fastest relevant line, and the smallest and largest number of states.
-_STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
-# Times are evenly spaced if they deviate by less than this share of a step, by single precision or printed digits.
+# States of the even grid in a period of the fastest relevant line, and the fewest and most states in all.
+_STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
+# Times are even if they deviate by less than this share of a step, as single precision and printed digits do.
 _EVEN: Final = 1e-3
 # The power of white noise hardly exceeds this many times its median.
 _ABOVE_NOISE: Final = 20.0

@@ -94,8 +94,8 @@ class DoneWindow(NamedTuple):
         return self.landing - self.planned
 
     @property
-    def told(self) -> str:
-        """Sentence for the user about the result of the window."""
+    def description(self) -> str:
+        """Sentence for the user on what became of the window."""
         if self.flight is None:
             return "no flight is seen there"
         if self.took_off is not None:
