@@ -146,7 +146,7 @@ class Cards:
         ]
 
     def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
-        """Return what is printed with the given options, and these parts to switch."""
+        """Return the options of the card with the given parts to switch."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_id_ranges("--node", self.node))

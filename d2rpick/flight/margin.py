@@ -321,7 +321,7 @@ def _select_momenta_of_flight(
 
 
 def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
-    """Return the unit vector (3,) along which gravity changes the momentum in a flight, without gravity that of motion.
+    """Return the unit vector (3,) of gravity in a flight; if there is no gravity, that of the motion.
 
     None if the momentum is not written, or nothing moves.
     """

@@ -253,7 +253,10 @@ def _read_file(name: str) -> bytes | OnDisk:
     """Return the content of a file; raise FormatError if it cannot be read."""
     try:
         return open_content(name)
-    except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
+    except (
+        OSError,
+        ValueError,
+    ) as error:  # a name with a NUL character raises ValueError
         raise _report_unread(name, error) from None
 
 

@@ -71,7 +71,7 @@ _ERROR: Final = Field(
     "ndjson see common_errors in the last line",
     lambda run_and_error: run_and_error[1],
 )  # fmt: skip
-# A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
+# Fields of a run and of its error at the common tr, in JSON and in a row of the CSV.
 RUN: Final = row(
     *PLAIN.of_part(lambda run_and_error: run_and_error[0]), _ERROR, **_JUDGED
 )

@@ -141,7 +141,7 @@ def _check_times_in_order(case: Case) -> Iterator[Objection]:
         together = (
             opening.kind == closing.kind == "restart"
             and opening.card.file == closing.card.file
-        )  # rule D2R117 reports such cards
+        )  # rule D2R117 reports cards with such times
         if (
             first.td is not None
             and first.td <= first.tr

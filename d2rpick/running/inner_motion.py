@@ -43,7 +43,7 @@ _MUCH_LONGER: Final = 2.0
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
 # A period is known to 10 %, so a given wait may be this share of half the period.
 _EXACT: Final = 0.9
-# Parts with a smaller share of the mass hardly move the others.
+# Parts with a smaller share of the mass hardly move the other parts.
 _HEAVY: Final = 0.05
 # Internal energy below this share of the largest energy is round-off, so there is no vibration.
 _ROUND_OFF: Final = 1e-6

@@ -58,7 +58,7 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            self._resume_points, self._last_states = {}, []  # a file is gone
+            self._resume_points, self._last_states = {}, []  # the file no longer exists
         history = self._read_on(names)
         new_states = None
         if history is not None:

@@ -168,7 +168,7 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Return the number of states up to the last one that deviates from the modes; states lead to the window."""
+    """Count the states up to the last that deviates from the modes; all of them precede the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(

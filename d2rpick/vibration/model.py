@@ -154,7 +154,7 @@ class Vibration:
 
     @cached_property
     def least_residual(self) -> float | None:
-        """Return the smallest residual of all tr that save much [-], for many modes; otherwise None."""
+        """Return the smallest residual of all tr with large savings [-] if there are many modes; otherwise None."""
         if self.basis != "modal" or self.profile is None or self.compared is None:
             return None
         last = self.td - NEAR_TD * (self.td - self.compared.first)

@@ -182,7 +182,9 @@ def _fit(
     )  # noise may make a free vibration grow
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
-    weight = np.abs(deformation)  # a relative error of the energy is halved in its root
+    weight = np.abs(
+        deformation
+    )  # the root of the energy has half of its relative error
     solution = np.linalg.lstsq(
         basis * weight[:, np.newaxis], deformation * weight, rcond=None
     )[0]

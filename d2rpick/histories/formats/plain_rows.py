@@ -138,7 +138,7 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # a number that is not finite does not agree
+    with np.errstate(invalid="ignore"):  # only finite numbers can agree
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 
