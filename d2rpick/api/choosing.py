@@ -1,4 +1,4 @@
-"""Keyword arguments that say how to choose and judge.
+"""Define the keyword arguments for choosing and judging.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """

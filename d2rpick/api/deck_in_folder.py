@@ -1,4 +1,4 @@
-"""Find the main deck in the folder of a run: with it, a folder alone shows which parts become one rigid body."""
+"""Find the main deck in the folder of a run, which shows the parts that become one rigid body."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
+MOST_REPLAYED = 10_000_000  # a longer text would have some gigabytes
 HISTORIES = (
     "csv",
     "hdf5",
@@ -134,7 +134,9 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        assert oscillator is not None  # the options that define it are required
+        assert (
+            oscillator is not None
+        )  # click requires the options that define an oscillator
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:

@@ -324,7 +324,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, from which times that are not given are read."""
+    """Judge a pair, also by a finished switched run, which gives the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

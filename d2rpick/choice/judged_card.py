@@ -123,7 +123,9 @@ def print_judged_card(
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
     """Return the windows of switches by force, narrowed to output states, as they are judged."""
-    from d2rpick.flight.contact_times import narrow_to_states  # as above
+    from d2rpick.flight.contact_times import (
+        narrow_to_states,
+    )  # imported here: other cards do not need it
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)
     return tuple((tr, td) for tr, td in narrowed if td is not None)
@@ -162,7 +164,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # no level to match, as the warning states
+    if verdict.situation.at_rest:  # there is no level to match, as the warning says
         return
     measures = [
         f"{name} {value:.3f}"

@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# a narrower terminal is treated as if tables were never read there [columns]
+# narrower terminals are ignored [columns]
 _NARROWEST: Final = 40
 # formats implied by file names
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # formats often expected of a report, but not supported
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Lines of a result that are bold: what is recommended or judged, and what is to be changed in a deck.
+# Lines of a result in bold: recommendations, verdicts, and changes of a deck.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 
 
-# Arguments that messages name in backticks, with the options that set them if these have other names.
+# Arguments that messages name in backticks, with their options if these have other names.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -73,7 +73,7 @@ _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {
     "table",
     "markdown",
-}  # forms whose answer itself says why nothing is recommended
+}  # forms whose answer itself explains why nothing is recommended
 
 
 class Verdict(Protocol):
@@ -93,7 +93,7 @@ class Verdict(Protocol):
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Writes results to stdout or a file, and all else to stderr unless ``quiet``; ``inputs`` are never overwritten."""
+    """Writes results to stdout or a file, and everything else to stderr; ``inputs`` are never overwritten."""
 
     plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -232,7 +232,7 @@ class Output:
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError if ``name`` cannot be written, is an input, or exists and must not be replaced."""
-        from pathlib import Path  # imported here since --help does not need it
+        from pathlib import Path  # imported here: --help does not need it
 
         path = Path(name)
         if path.is_dir():
@@ -288,7 +288,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print what a reader left out, and the warnings."""
+        """Print the omissions of a reader, and the warnings."""
         if self.quiet:
             return
         for note in notes:
@@ -366,14 +366,14 @@ def tell(message: str) -> None:
     if is_on_terminal() and (width := measure_columns(sys.stderr)):
         from d2rpick.report.tables import (
             wrap_lines,
-        )  # imported here since --help does not need it
+        )  # imported here: --help does not need it
 
         text = wrap_lines(text, width)
     click.echo(text, err=True)
 
 
 def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
-    """Return any error as one line with the options of the command line; ``--debug`` prints its traceback first.
+    """Return any error as one line, which names options instead of arguments; ``--debug`` prints its traceback.
 
     An unforeseen error names no input, so that ``inputs`` are added.
     """
@@ -430,7 +430,7 @@ def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
         return text
     from d2rpick.report.tables import (
         wrap_lines,
-    )  # imported here since --help does not need it
+    )  # imported here: --help does not need it
 
     return wrap_lines(text, width)
 

@@ -179,14 +179,14 @@ def _read_list(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # Not splitlines(): a name may contain its other line separators.
+    # Not splitlines(): names may contain its other line separators.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
-    """Raise D2RPickError if a result, ``written`` by its option, would overwrite the file of ``--resume``."""
+    """Raise D2RPickError if a result (``written`` by its option) would overwrite the file of ``--resume``."""
     if name is None:
         return
     for option, file in written.items():

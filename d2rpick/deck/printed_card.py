@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
-WIDTH = 10  # columns of a field
+WIDTH = 10  # width of a field [characters]
 LONGEST = WIDTH - 1  # characters of a number: a blank separates it from the next field
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
@@ -97,7 +97,7 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: ``text`` is all of it, ``files`` is the same by the file names that the solver expects.
+    """Solver input: ``text`` is all of it, and ``files`` has the same text by the file names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.

@@ -91,7 +91,7 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-DEFAULT: Final = "ls-dyna"  # solver for histories that name none
+DEFAULT: Final = "ls-dyna"  # solver for histories whose format belongs to no solver
 
 
 def _print_ls_dyna(
@@ -108,7 +108,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id in the same line, separated by a blank.
+        # The lead id follows another id on the same line, separated by a blank.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -144,7 +144,6 @@ def _write_window(
     printing: Printing,
     part_sets: PartSets,
 ) -> Iterator[str]:
-    # Both begin with a comment line.
     """Yield the lines of the two switch sets of one window."""
     rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
     deformable_lines = [*write_deformable_lines(ids, part_sets)]
@@ -194,7 +193,7 @@ def _print_ls_dyna_contact(
     """
     from d2rpick.deck.contact_timing import (
         find_pair_timing,
-    )  # not above: other cards do without
+    )  # imported here: other cards do not need it
 
     windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
@@ -330,7 +329,7 @@ def _print_radioss_sensors(
     """
     from d2rpick.deck.radioss_sensors import (
         invert_spans,
-    )  # not above: other cards do without
+    )  # imported here: other cards do not need it
 
     windows, _, _ = _check_run(windows, printing)
     return _print_sensors(
@@ -507,7 +506,7 @@ def _combine_card(
     files: Mapping[str, str],
     further_cards: str = "",
 ) -> PrintedCard:
-    """Combine comments, cards for the starter deck and engine files to a card."""
+    """Combine comments, cards for the starter deck and engine files into a card."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
     head = write_comments(
         [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]

@@ -1,4 +1,4 @@
-"""Write the verdict on a pair of times: what to do, why, what to expect after td, and what would be better."""
+"""Write the verdict on a pair of times: what to do, why, what to expect after td, and how to improve it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
-    """Return what to do with a pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with a pair, why, and how to improve it, as pairs of a name and a sentence."""
     lines = [
         (decision.verdict, f"tr = {tr:.6g}, td = {td:.6g}"),
         ("why", decision.reason),
@@ -54,7 +54,7 @@ def list_statements(decision: Decision) -> Lines:
 
 
 def explain_grade(grade: Grade, decision: Decision) -> str:
-    """Return why a grade is not better and what would improve it, unless the verdict already says so."""
+    """Return why a grade is not better and how to improve it, unless the verdict already says so."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""

@@ -94,7 +94,7 @@ def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def list_savings(answer: Driven) -> list[tuple[str, str]]:
-    """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
+    """Return the savings and remarks, as pairs of a name and a sentence."""
     words = zip(
         answer.saved,
         ("by the cost model", "by the CPU time of its engine runs"),

@@ -1,4 +1,4 @@
-"""Build the interactive part of a page: the user drags, types or steps td, and everything that depends on td follows.
+"""Build the interactive part of a page, which updates everything that depends on td when the user changes td.
 
 Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
 that every page has.
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of intervals for which the lowest and highest energy is drawn: in the view, and in the overview of the run.
+# Number of intervals for which the lowest and highest energy is drawn, in the view and in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
 # Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
@@ -262,7 +262,7 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
 
 
 def _compute_saved_percentage(offer: Offer) -> float | None:
-    """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
+    """Return the saving of a pair [%]: of the CPU time, or of the simulated time without part costs."""
     share = offer.saving
     if offer.best and share is None:
         share = offer.best.rigid_fraction
@@ -309,7 +309,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 
 
 def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
-    """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
     best = offer.best
     decision = offer.decision_with_cure
     return {
@@ -365,7 +365,7 @@ def _format_for_screen_reader(offer: Offer) -> str:
 
 
 def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
-    """Describe what an offer costs and gains compared with the offer shown first."""
+    """Describe the loss and gain of an offer compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td

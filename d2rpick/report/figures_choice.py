@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 # Heights of a figure in a file [inch]: of the energy alone, and with the motion; on a page those of each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Up to this number candidates are drawn as marks; more are drawn as a band of admissible tr.
+# Largest number of candidates drawn as marks; more are drawn as a band of admissible tr.
 _FEW: Final = 20
 # Height of the band at the bottom of the axes, clear of the curve, as a share of the axes.
 _BAND: Final = 0.045
@@ -82,7 +82,7 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # distinguishable without colour, too
+}  # line styles that are distinguishable without colour
 # height of the figure in a file, and of the axes on a page [inch]
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.
@@ -106,11 +106,11 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to this number of runs each has its own colour and name; more are grey, and only those that stand out are named.
+# Largest number of runs with colours and names; of more runs only outliers are named, and the others are grey.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# Many grey curves are together as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
+# Many grey curves together are as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
 _DARK, _FAINTEST = 10, 0.02
 # with more runs than this, lines and marks are thin
 _MANY: Final = 40
@@ -187,7 +187,7 @@ def _draw(
     panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
     for panel in panels:
         figures.format_axes(panel, legend=not page)
-    # the level belongs to the flight, even if td lies beyond it
+    # the level belongs to the flight, even if td is after its end
     scale = make_scale_of_flight(situation, view, [situation.energy_td])
     figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
@@ -254,7 +254,7 @@ def _draw_energy(
 def _draw_better(
     panels: Sequence[Axes], better_situation: Situation, tr: float
 ) -> None:
-    """Draw a better pair as seen from its own td: level, times and motion, in its own colour and line style."""
+    """Draw a better pair for its own td: level, times and motion, in its own colour and line style."""
     lines = [panels[0].axhline(better_situation.energy_td)]
     lines += [
         panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
@@ -319,7 +319,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports, else what is to be done about it."""
+    """Return the verdict on a window supported by this run, or else its next step."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status
@@ -497,7 +497,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
 def _choose_named_runs(
     runs: Sequence[StudyRow], curves: Mapping[int, Samples]
 ) -> list[_Named]:
-    """Return the runs with their own colour and name: all if there are few, else those that stand out."""
+    """Return the runs with their own colour and name: all if there are few, otherwise the outliers."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:

@@ -1,4 +1,4 @@
-"""Write answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
+"""Write answers as HTML: pages to be read, printed and signed, and displays in notebooks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# Most rows of a table on a page: the eye cannot compare more, and CSV and JSON hold all.
+# Most rows of a table on a page: more cannot be compared by eye, and CSV and JSON have all.
 _MOST_ROWS = 20
 
 # Most rows of a table in a notebook.
@@ -380,7 +380,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
-    """Return the outcome without what the card of the common tr has already."""
+    """Return the outcome without the contents of the card of the common tr."""
     outcome = study.list_outcome(answer)
     return outcome if answer.common.tr is None else outcome[1:]
 
@@ -545,7 +545,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
     )
 
 
-# For each kind of answer: sentences, the shortest first, and the head and rows of its table.
+# For each kind of answer: sentences, the shortest first, and the header and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.
+# Columns of the sets, and of the parts in two tables: as many as fit next to each other on a screen or sheet.
 SETS = (
     "set",
     "parts",
@@ -89,7 +89,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# a part's behaviour in flight is that in the longest flight
+# the behaviour of a part in flight is that in the longest flight
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -267,12 +267,12 @@ def as_csv(answer: Parts, _: DisplayOptions) -> str:
 
 
 def as_value(answer: Parts, _: DisplayOptions) -> str:
-    """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
+    """Return the part ids of the recommended set in the form of ``--part``, nothing if none is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
 def list_heading(answer: Parts) -> list[tuple[str, str]]:
-    """Return what was read, as pairs of a name and a description."""
+    """Return the input, as pairs of a name and a description."""
     run = answer.files
     deck = answer.inventory
     formats = " + ".join(database.format for database in run.databases)
@@ -427,7 +427,7 @@ def _format_sharing_parts(row: PartRow) -> str | None:
 
 
 def format_part_ranges(ids: Sequence[int]) -> str:
-    """Return part ids as ``--part`` takes them.
+    """Return part ids in the form of ``--part``.
 
     Examples
     --------

@@ -192,7 +192,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
+    """Return the plan in a sentence, the next command, a row per flight, and reasons with improvements."""
     if plan.flights:
         rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
     else:
@@ -217,7 +217,7 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def give_plan_sentence(plan: RunPlan) -> str:
-    """Return what to do, in one sentence."""
+    """Return the recommended action in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
     if not supported:
@@ -275,7 +275,7 @@ def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return why the planned windows are not better and what would improve them, each with the name of its flight."""
+    """Return why the planned windows are not better and how to improve them, each with the name of its flight."""
     return [
         (f"flight {row.number}", format_in_full(row.decision))
         for row in plan.flights
@@ -323,7 +323,7 @@ def as_value(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
+    """Return the rigid time given up for quality, and the position errors, as pairs of a name and a sentence."""
     supported = plan.supported
     lines = []
     pairs = [(row.number, row.answer) for row in supported if row.answer]

@@ -1,4 +1,4 @@
-"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
+"""Describe the common parts of suggest and verify: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def name_energy(history: History) -> str:
 def list_situation_heading(
     situation: Situation, *, verbose: bool = False
 ) -> list[tuple[str, str]]:
-    """Return the history and what the choice rests on, as pairs of a name and a text; ``verbose`` adds the reasons."""
+    """Return history and basis of the choice, as pairs of a name and a text; ``verbose`` adds reasons."""
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
@@ -78,7 +78,7 @@ def name_evidence(source: str | None) -> str:
 
 
 def _describe_basis(situation: Situation) -> str:
-    """Return what the choice rests on, and the fitted oscillator."""
+    """Return the basis of the choice, and the fitted oscillator."""
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
@@ -105,7 +105,7 @@ def _describe_basis(situation: Situation) -> str:
 
 
 def _explain_level_alone(situation: Situation) -> str:
-    """Return a note that no deformation is known, with the reason if it is that several modes vibrate."""
+    """Return a note that no deformation is known, with the reason if several modes vibrate."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
@@ -114,7 +114,7 @@ def _explain_level_alone(situation: Situation) -> str:
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
-    """Return the column names of a table of health; the first says up to which time the run was judged."""
+    """Return the column names of a table of health; the first gives the time up to which it was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",

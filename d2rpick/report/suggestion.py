@@ -144,7 +144,7 @@ def _select_shown_candidates(
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
+    """Return CSV of all candidates, with one column for td and one for each JSON key except ``parts``."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
@@ -205,7 +205,7 @@ def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
-    """Return in which respect the better pair is better."""
+    """Return the respects in which the better pair is better."""
     recommended = answer.recommended
     if recommended is None:
         return "it has an admissible tr"
@@ -258,7 +258,7 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Return how much rigid time was given up for a better level or residual, and how much better it is."""
+    """Return the rigid time given up for a better level or residual, and the improvement."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:

@@ -47,7 +47,7 @@ COLUMNS: Final = [
 
 # smallest change of the rigid time, as a share of it, that is mentioned
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share within these limits is halved; if it falls further, its new value is what counts.
+# An error that falls to a share within these limits is halved; if it falls further, its new value is given.
 _HALF: Final = (0.45, 0.5)
 
 
@@ -64,7 +64,7 @@ _NOT_HALVED: Final = "halves the error and keeps half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the answer in a sentence, the verdict on the best pair, some Pareto-optimal offers, and the input."""
+    """Return the answer in a sentence, the verdict on the best pair, Pareto-optimal offers, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -93,7 +93,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with the recommended pair, why, and how to improve it, as pairs of a name and a text."""
     best = trade_off.recommended
     decision = best.decision_with_cure if best else None
     if best is None or best.best is None or decision is None:
@@ -119,7 +119,7 @@ def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
 
 
 def give_answer(trade_off: TradeOff) -> str:
-    """Return in one sentence how good the requested td is, and what a change to another td gains or costs.
+    """Return in one sentence how good the requested td is, and the gain or cost of another td.
 
     Without a requested td, the comparison starts from the td that saves most.
     """
@@ -185,7 +185,7 @@ def _describe_longest(start: Offer) -> str:
 
 
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
-    """Return how far the other td is away, and its value."""
+    """Return the distance of the other td, and its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
@@ -230,7 +230,7 @@ def _format_offer_error(offer: Offer) -> str:
 
 
 def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
-    """Return the offers that the answer names, and Pareto-optimal ones at even distances, up to ``limit`` in all."""
+    """Return the offers named by the answer, and evenly spaced Pareto-optimal ones, up to ``limit`` in all."""
     named_td = {
         offer.td
         for offer in (
@@ -256,7 +256,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 def build_offer_table(
     offers: Sequence[Offer],
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of some offers; the recommended offer has a star."""
+    """Return the column names and cells of the offers; the recommended offer has a star."""
     return tables.fill_table(_COLUMNS, offers)
 
 

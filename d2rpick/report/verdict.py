@@ -68,7 +68,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
+    """Return the verdict, the reasons and improvements, its evidence, and the measures of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
@@ -89,7 +89,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
-    """Return what to do with the pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with the pair, why, and how to improve it, as pairs of a name and a sentence."""
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
 
 

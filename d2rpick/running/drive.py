@@ -42,12 +42,12 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest step of a rigid leg over the mean step of the deformable legs.  A rigid leg then costs a few percent of a
-# deformable one, and its history still has enough states to show a contact.
+# Largest step of a rigid leg relative to the mean step of the deformable legs.
+# A rigid leg then costs a few percent of a deformable one, and its history has enough states to show a contact.
 _STEP_RATIO: Final = 5.0
-# A flight that was shorter than the wait is reported if it lasted for this share of the wait.
+# A flight shorter than the wait is reported if it lasted for this share of the wait.
 _REPORTED: Final = 0.5
-# Pause between two checks whether the solver is running, and how long it may be silent before this is reported [s].
+# Pause between two checks of the solver, and its longest silence before a report [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
@@ -78,7 +78,7 @@ class Driven:
 
 @dataclass
 class Driver:
-    """Computes one run in its folder, from where its journal ends.
+    """Computes one run in its folder, from the end of its journal on.
 
     ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
@@ -95,7 +95,7 @@ class Driver:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, discarded ones included, except those before whose start the run went back."""
+        """Computed legs, including discarded ones, except those before whose start the run went back."""
         legs: list[Leg] = []
         for record in self.journal.records:
             if record["event"] == "ended":
@@ -106,14 +106,14 @@ class Driver:
 
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
-        """Warnings for all windows in which parts still swung at tr."""
+        """Warnings for all windows in which parts still oscillated at tr."""
         messages = dict.fromkeys(
             record["place"] for record in self.journal.all("ended")
         )
         return tuple(Caution("out-of-place", text) for text in messages if text)
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless that is done.
+        """Copy the deck into the folder and run the starter, unless this was done.
 
         Raises
         ------
@@ -139,14 +139,14 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed; before the first one, for how many ``seconds`` the starter runs."""
+        """Describe the leg that is being computed; before the first one, how many ``seconds`` the starter runs."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
         return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
-        """Compute leg after leg to the end of the run.
+        """Compute leg after leg up to the end of the run.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg; go back leg by leg until the restart that it begins with is whole."""
+        """Choose the next leg; go back leg by leg until its initial restart is complete."""
         legs = self.legs
         leg_count = len(legs)
         order = choose_next_leg(legs, self.limits)

@@ -1,4 +1,4 @@
-"""Find the events of a run so far: pushes, flights, contacts, when to switch, and rigid parts."""
+"""Find the events of a run so far: pushes, flights, contacts, advised switches, and rigid parts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from d2rpick.running.inner_motion import InnerMotion
     from d2rpick.running.witness import Quiet
 
-    # Events of the flights that are decided, by the start of each flight and when it was seen.
+    # Events of the flights that are over, by the start of each flight and the time when it was seen.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
 
 
 class Event(NamedTuple):
-    """What happened, as a stable word, when, and at which state it was ``seen`` [time], with a sentence.
+    """An event: a stable word, its time, the state at which it was ``seen`` [time], and a sentence.
 
     ``wait`` is how long no force had to act to count as flight [time], ``left`` what changed meanwhile, as a share of
     the largest value, ``tr`` the advised time [time].  They are None if an event has none.
@@ -68,7 +68,7 @@ def find_events(
 def _is_rigid(
     tr: float | None, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> bool:
-    """Return True if parts are rigid already at a tr that is advised."""
+    """Return True if parts are already rigid at an advised tr."""
     if tr is None:
         return False
     return any(start <= tr <= end for start, _, end in rigid_times)
@@ -77,7 +77,7 @@ def _is_rigid(
 def _describe_rigid_times(
     history: History, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> Iterator[Event]:
-    """Give the events of parts that become rigid and deformable again, except bodies that are rigid from the start."""
+    """Yield the events of parts that become rigid and deformable, except bodies that are always rigid."""
     for start, seen_at, end in rigid_times:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
             continue
@@ -92,7 +92,7 @@ def _describe_rigid_times(
 def _describe_flight(
     history: History, motion: InnerMotion, flight: Quiet, decided: Decided
 ) -> Iterator[Event]:
-    """Give the events of a flight: its start, when to switch, and its contact."""
+    """Yield the events of a flight: its start, the advised switch, and its contact."""
     key = (flight.start, flight.seen)
     events = decided.get(key)
     if events is None:
@@ -111,7 +111,7 @@ def _describe_flight(
 
 
 def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
-    """Report that a flight is seen, by what evidence, and why it was not seen before."""
+    """Report that a flight is seen, by which evidence, and why it was not seen before."""
     quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
@@ -144,7 +144,7 @@ def _suggest_switch(
 
 
 def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise a switch once the internal energy is high; if it is not within one more wait, when it was highest."""
+    """Advise a switch when the internal energy is high, or after one more wait when it was highest."""
     last = flight.seen + flight.wait
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
@@ -171,7 +171,7 @@ def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts swing too much for a flight that has lasted up to tr; "" if not."""
+    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise ""."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

@@ -1,4 +1,4 @@
-"""Print the cards of a first run that switches itself: without a reference, the solver sees flights by contact forces.
+"""Print the cards of a first run that switches itself: the solver detects flights by contact forces.
 
 Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
-# The starter of OpenRadioss reads /RBODY/OFF in so many engine files.  A leg after the end of the run takes one step.
+# Number of engine files from which the OpenRadioss starter reads /RBODY/OFF; a leg after the end takes one step.
 _MOST_LEGS: Final = 9
-# The largest step while rigid is the wait over this number: a contact is seen at most so late.
+# The largest step while rigid is the wait divided by this number, so a contact is seen at most that late.
 _STEPS_PER_WAIT: Final = 300
-# LS-DYNA: a contact does not release the parts for the wait over this number after they became rigid.
+# LS-DYNA: time after a switch in which a contact does not release the parts, as the wait divided by this number.
 _DELAYS_PER_WAIT: Final = 100
 # Radioss: loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
@@ -73,8 +73,8 @@ _OF_LS_DYNA: Final = (
 )
 # LS-DYNA: loads that act without a contact, and those of them that are gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA: offset before a contact over the thickest shell.  It must be above the thickness of the contact: half of the
-# thickness of each shell.
+# LS-DYNA: offset before a contact relative to the thickest shell.
+# It must exceed the thickness of the contact, which is half of the thickness of each shell.
 _OFFSET_THICKNESSES: Final = 2
 
 
@@ -191,7 +191,7 @@ def _refuse_loads(starter: Starter) -> None:
 def _falls_from_rest(
     run: RadiossRun, inventory: Inventory, parts: Collection[int]
 ) -> bool:
-    """Return True if the parts are at rest at first and gravity acts on them; no support holds them."""
+    """Return True if the parts are initially at rest without support, and gravity acts on them."""
     if run.starter is None or run.starter.named("INIVEL"):
         return False
     if any(leg.starts for leg in run.legs):
@@ -200,7 +200,7 @@ def _falls_from_rest(
 
 
 class _Sensors(NamedTuple):
-    """The cards of the sensors, and the ids of those of a contact force and of a flight."""
+    """The cards of the sensors, and the ids of the sensor of a contact force and of a flight."""
 
     text: str
     contact: int
@@ -210,7 +210,7 @@ class _Sensors(NamedTuple):
 def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
-    """Write sensors of a contact force within the wait, and of a flight: no such force, from a first time on."""
+    """Write sensors of a contact force within the wait, and of a flight without such a force."""
     cards: list[str] = []
     for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
         row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
@@ -241,7 +241,7 @@ def _write_legs(
     *,
     at_rest: bool,
 ) -> dict[str, str]:
-    """Write the engine files, deformable and rigid in turn; rigid first if the parts fall from rest."""
+    """Write the engine files, deformable and rigid alternately; rigid first if the parts fall from rest."""
     (leg,) = run.legs
     other_nodes = tuple(
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes

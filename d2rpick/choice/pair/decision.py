@@ -1,4 +1,4 @@
-"""Give one verdict on a pair of times, with its reason, the time after td, the worst case, and a better pair.
+"""Give one verdict on a pair, with its reason, the expected and the worst motion after td, and a better pair.
 
 All commands, forms and pages take their words from here, so that none contradicts another.
 """
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.pair.situation import Situation
 
-# Cures of a pair that is not admissible: one for any pair, and one for a recommended pair whose finished switched run
-# contradicts the recommendation.
+# Cures of a pair that is not admissible: one for any pair,
+# and one for a recommended pair that is contradicted by its finished switched run.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
-# A worst case within this difference of the expected residual is shown as the same [-].
+# A worst case that differs by less from the expected residual is not shown separately [-].
 _ALIKE: Final = 5e-3
 
 
@@ -90,7 +90,7 @@ class Decision(NamedTuple):
 
     @property
     def expected(self) -> str:
-        """Description of the expected time after td."""
+        """Description of the expected motion after td."""
         if self.at_rest:
             return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
@@ -104,7 +104,7 @@ class Decision(NamedTuple):
 
     @property
     def worst_case(self) -> str:
-        """Description of the worst time after td that the record allows."""
+        """Description of the worst motion after td that the record allows."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
@@ -135,7 +135,7 @@ def decide(
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
 ) -> Decision:
-    """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair.
+    """Decide on a tr in a situation; any ``objections`` make it inadmissible, ``better`` is a better pair.
 
     Without a better pair, ``cure_of_objections`` says what to do about them.
     """
@@ -166,7 +166,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is kept, or hardly matters."""
+    """Explain why a pair is good: its vibration is preserved, or hardly matters."""
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f": it is wrong by {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"

@@ -1,4 +1,4 @@
-"""Warn about a td, estimate the time after it from the energy alone, and list the objections to a tr.
+"""Warn about a td, estimate the motion after it from the energy alone, and list the objections to a tr.
 
 Warnings have stable codes for scripts, and sentences for users.
 """
@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# States per period of the energy below which modes faster than those found may matter.
+# States per period of the energy below which undetected faster modes may matter.
 _FEW_STATES = 4
 # Kinetic fraction beyond which more than half of the vibration is lost at td for every tr [-].
 POOR_KINETIC_SHARE = 0.5
-# Residual beyond which a pair is poor [-]: 0.5 is 25 % of the vibration energy, and the error is visible in the motion
-# after td.
+# Residual above which a pair is poor [-]: 0.5 is 25 % of the vibration energy,
+# and the error is visible in the motion after td.
 POOR_RESIDUAL = 0.5
-# Plastic energy above this share of the vibration gets a warning [-]: energy alone cannot tell it from a preload.
+# Plastic energy above this share of the vibration energy gets a warning [-]: it may also be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Energy at rest as a share of the lowest in flight [-]: many modes are never at rest at once, so it is lower. This
-# share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16. The
-# lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
+# Static energy as a share of the lowest energy in flight [-]: many modes are never at rest at the same time.
+# This share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16.
+# The lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
 _AT_REST = 0.85
-# Largest mean energy after td over that of the reference run [-]. Switching adds no energy; a larger ratio means that a
-# contact lies in the flight. The estimate itself is right to within 20 %.
+# Largest mean energy after td relative to the reference run [-]. Switching adds no energy,
+# so a larger ratio means that a contact lies in the flight. The estimate itself is right to within 20 %.
 MOST_KEPT = 1.2
 # Largest exponent of e, near the largest double.
 _LARGEST_EXPONENT = 700.0
@@ -127,7 +127,7 @@ def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
-    """Yield the warnings about the flight and the place of td in it."""
+    """Yield the warnings about the flight and the position of td in it."""
     flight = situation.flight
     td = situation.td
     earliest = situation.earliest_tr
@@ -215,7 +215,7 @@ def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
 
 
 def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
-    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or if that is unknown."""
+    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or it is unknown."""
     bodies = situation.bodies
     if bodies is None:
         return
@@ -255,7 +255,7 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe parts that are not connected to the others and fly away from them."""
+    """Describe parts that are not connected to the others and separate from them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -345,7 +345,7 @@ class Expectation(NamedTuple):
 
 
 class Means(NamedTuple):
-    """Energies that decide the mean energy after td [energy].
+    """Energies that determine the mean energy after td [energy].
 
     ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``mean_after`` is the mean of the
     reference run after td.
@@ -373,14 +373,10 @@ def compute_means(situation: Situation) -> Means | None:
     mean = compute_mean_in_flight(situation)
     if mean is None or not situation.energy_td > 0 or situation.at_rest:
         return None
-    time, energy = _select_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
-    # the remaining decay is 0 if its exponential has no floating-point number
-    decay = np.exp(
-        np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
-    )
-    energy_after = resting + (mean - resting) / float(decay.mean())
+    energy_after = resting + (mean - resting) / compute_mean_decay(situation, time)
     if energy_after > round_off(situation.history):
         return Means(mean, lowest, resting, energy_after)
     return None
@@ -395,7 +391,7 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the time after td; None on another basis than "energy", without a flight or energy.
+    """Estimate the motion after td; None on another basis than "energy", without a flight or energy.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
     """
@@ -414,12 +410,18 @@ def estimate_time_after(
 
 def compute_mean_in_flight(situation: Situation) -> float | None:
     """Return the mean energy of the flight, up to td if its end is unknown [energy]; None unless it is positive."""
-    energy = _select_flight(situation)[1]
+    energy = select_energies_in_flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
     return mean if mean > round_off(situation.history) else None
 
 
-def _select_flight(situation: Situation) -> tuple[Samples, Samples]:
+def compute_mean_decay(situation: Situation, time: Samples) -> float:
+    """Return the mean vibration energy at the times relative to that at td [-], from the damping of the flight."""
+    exponents = -situation.flight.damping * (time - situation.td)
+    return float(np.mean(np.exp(np.minimum(exponents, _LARGEST_EXPONENT))))
+
+
+def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
     start = situation.flight.start
     end = situation.flight.end
@@ -444,7 +446,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection to the candidates for which ``holds`` is True, shape (n,).
+    """An objection to the candidates for which ``holds`` (n,) is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.
@@ -512,7 +514,7 @@ def list_objections(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # beyond its end the flight shows nothing about the time after td
+    # after its end the flight shows nothing about the time after td
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
@@ -562,7 +564,7 @@ def _tell_undescribed(
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
-    """Return the same objection for each candidate."""
+    """Return the same objection for every candidate."""
     return [reason]
 
 
@@ -606,7 +608,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """Describe that a switch is worse than a release without any vibration, or than the best one at this td."""
+    """Describe that a switch is worse than a release without vibration, or than the best one at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# CPU times are right within 5 %, the measured ratios of weights within 50 %: the ratio of both [-].
+# Ratio of the errors of CPU times, 5 %, and of the measured ratios of weights, 50 % [-].
 _DOUBT: Final = 0.1
-# A weight is determined by the legs if they decide more than this share of it, at the given doubt [-].
+# The legs determine a weight if they contribute more than this share to it, with the errors above [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -61,7 +61,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """CPU time of one leg of a run per cycle [us], and what the leg computed.
+    """CPU time of one leg of a run per cycle [us], and the elements and nodes computed in the leg.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
@@ -76,7 +76,7 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """Fitted weights and their origin.
+    """Fitted weights and the number of legs that determine each.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
     """
@@ -172,7 +172,7 @@ def _build_equations(
 
 
 def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Solve non-negative least squares for the unknowns that the rows determine; return all unknowns and which are.
+    """Solve non-negative least squares; return all unknowns, and which of them the rows determine.
 
     Undetermined unknowns stay 1.
     """

@@ -57,14 +57,14 @@ def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
-    """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
+    """Return the single rigid body of merged parts, regardless of the ``bodies`` they would become."""
     # a single part may consist of pieces
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
 def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
-    """Return a warning if a deck is not that of a run, else None.
+    """Return a warning if a deck does not belong to a run, otherwise None.
 
     It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
     have energy.
@@ -100,7 +100,7 @@ def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
 
 
 def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if some parts have other titles in the deck than in the history."""
+    """Yield a warning if parts have other titles in the deck than in the history."""
     differing = [
         part
         for part in parts
@@ -117,7 +117,7 @@ def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[C
 def warn_about_bodies(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
+    """Yield warnings if unread ties may join the bodies of ``parts``, or a body has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
             more_ties = f" and {len(inventory.ties) - 1} more ties"
@@ -145,7 +145,7 @@ def warn_about_bodies(
 def warn_about_solver(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings about what ruins a run, unknown supports, and parts whose stresses do not rotate with them."""
+    """Yield warnings about deck features that ruin a run, unknown supports, and stresses that do not rotate."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
@@ -184,7 +184,7 @@ def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caut
 
 
 def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
-    """Yield warnings about what was not followed in a deck and, if its cost is ``used``, about weights not measured."""
+    """Yield warnings about unread cards of a deck and, if its cost is ``used``, about assumed weights."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
@@ -206,7 +206,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 
 
 def _is_different_title(first_title: str, second_title: str) -> bool:
-    """Return True if two titles differ, except in spaces, case, and length if one is cut off.
+    """Return True if two titles differ, ignoring spaces, case, and the length of a truncated one.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
@@ -328,7 +328,7 @@ def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _sum_gravity(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
+    """Return the possible values of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
         values = loads[0].values if loads else ()
         return tuple(sorted({abs(value) for value in values} or {0.0}))

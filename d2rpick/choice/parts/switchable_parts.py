@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-]: most of the
-# energy is plastic work then, and the vibration a small part of it.
+# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-].
+# Most of the energy is then plastic work, and the vibration a small part of it.
 STOPPED: Final = 0.1
-# The start of a landing, as a share of the duration of the flight before it [-].
+# Duration of the first phase of a landing, as a share of the flight before it [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part drives the landing alone if it takes up at least this share of the energy at first, and has at most this share
-# of the cost, so that it is cheap to keep it deformable [-]: a bumper or a skid, not the body shell.
+# A part takes the landing alone if it absorbs at least this share of the energy at first.
+# It must have at most the second share of the cost, so that it may stay deformable [-], such as a bumper or a skid.
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
@@ -111,7 +111,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # no part ever deforms
+    except FormatError as error:  # raised if no part ever deforms
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -144,7 +144,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together, or of all that deform without momenta, and the flying parts."""
+    """Return the energy of the parts that fly together, or of all deformable parts, and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -153,7 +153,7 @@ def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | No
 def _is_flying(
     part: Part, flight: Flight, members: Sequence[Part] | None
 ) -> bool | None:
-    """Return True if a part flies with the rest; None if no momenta of parts show it."""
+    """Return True if a part flies with the others; None if no part momenta show it."""
     if members is None:
         return None
     together = flight.parts if flight.source == "momentum" and flight.parts else members
@@ -181,7 +181,7 @@ def _measure_in_flight(
 def _measure_landing(
     time: Samples, energy: Samples, span: tuple[float, float]
 ) -> float | None:
-    """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
+    """Return the energy that a part absorbs at the start of the landing [energy]; None if the record ends before."""
     start, end = span
     energies = energy[find_window(time, end, end + _LANDING * (end - start))]
     if end < float(time[-1]) and energies.size > 1:
@@ -202,7 +202,7 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
 
 
 class PartRow(NamedTuple):
-    """One part with all its data; None for unknown values.
+    """All data of one part; None for unknown values.
 
     ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
     time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
@@ -268,7 +268,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; mass and time step ``by_deck`` are used if no better ones are known."""
+    """Collect the data of a part; mass and time step ``by_deck`` are used if no better values are known."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -328,7 +328,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with its verdict and reasons; ``alone`` is the part that drives the landing alone."""
+    """Return the row of a part with verdict and reasons; ``alone`` is the part that takes the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(
@@ -469,7 +469,7 @@ def compute_step_growth(
 
 
 def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
-    """Find the cheap part that takes up nearly all energy at the start of the landing after the longest flight."""
+    """Find the cheap part that absorbs nearly all energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
         for row in rows
@@ -485,7 +485,7 @@ def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merge_rows(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Merge parts that share nodes or are joined into one rigid body: the first id leads, the others merge with it."""
+    """Merge connected parts into one rigid body: the first id is the lead part, the others are merged with it."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

@@ -1,4 +1,4 @@
-"""Compare a finished switched run with its reference run: the energy locked in, the energy at td, and the motion.
+"""Compare a finished switched run with its reference run: locked-in energy, energy at td, and motion.
 
 Between tr and td only the energy is compared: a rigid part reports neither kinetic energy nor momentum.
 """
@@ -25,26 +25,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest deviation of the momentum after td, as a share of it; beyond it the motion differs from the reference [-].
+# Largest deviation of the momentum after td, as a share of the momentum; beyond it the motion is different [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Smaller momenta than this share of the largest of the run count as this share: a resting body cannot deviate much [-].
+# Momenta below this share of the largest one are replaced by it: a resting body cannot deviate much [-].
 _AT_REST = 0.01
-# Some solvers report a wrong energy for rigid solid elements. A difference beyond this share, and beyond the usual
-# change from state to state, gets a note [-].
+# A larger difference between energies while rigid and at td gets a note [-], if it also exceeds the usual change
+# between states. Some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# Largest change of a constant energy, as a share of the energy and of the vibration [-]. A rigid body keeps the energy
-# to its digits; a vibrating one changes by more from state to state. If most of the energy is plastic work, the
-# vibration is a small part of it, hence the second share.
+# Largest change of a constant energy, as a share of the energy and of the vibration [-].
+# The energy of a rigid body is constant to its digits; that of a vibrating one changes more between states.
+# If most of the energy is plastic work, the vibration is a small part of it, hence the second share.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# Tolerance for the energy about tr, as a share of it [-]: a solver switches at the first step from tr on, and output
-# may miss that by a state or two.
+# Tolerance for the energy near tr, as a share of it [-]: a solver switches at the first step after tr,
+# and output may miss that by a state or two.
 _ABOUT = 0.05
 # Number of times between two states at which the switch to rigid is searched.
 _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; the fields are the keys of the JSON output, None if the files lack the quantity.
+    """Measures of a switched run; the fields are the keys of the JSON output, None for unknown quantities.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
     and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
@@ -79,7 +79,7 @@ def compare_with_reference(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a finished switched run with its reference run, by the parts that show how right it is.
+    """Compare a finished switched run with its reference run, by the parts that are in both.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
     ``compare_runs``.
@@ -175,7 +175,7 @@ def compare_runs(
         and _is_reported_wrong(energies_before[-1], energies_to_end[1:])
     ):
         energies_after = energies_after[1:]
-        # the switch comes at the first step from td on: this state was still rigid
+        # the switch comes at the first step from td on, so this state was still rigid
         energies_to_end = energies_to_end[1:]
     frozen = float(energies_after[0])
     energy_td = reference.energy_at(td)
@@ -243,7 +243,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the largest change of a constant energy [energy]: small relative to the vibration, or digits."""
+    """Return the largest change of a constant energy [energy]: a share of the vibration, or digits."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -283,7 +283,7 @@ def _check_rigid_window(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Yield an objection if the energy is not constant from about tr to about td, as far as the states show.
+    """Yield an objection if the energy is not constant from tr to td, as far as the states show.
 
     A constant energy before tr or after td matters only if that of the reference run is not constant there.
     """
@@ -313,9 +313,9 @@ def _check_rigid_window(
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
+    """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # nothing vibrates: the error of nothing means nothing
+        return  # without a vibration the relative error has no meaning
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -337,7 +337,7 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: its energy is constant between them, that of the reference run is not.
+    """Find tr and td of a switched run: the window in which only its energy is constant.
 
     Returns
     -------
@@ -354,7 +354,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     rounding = round_off(reference)
-    # in a fall the energy of rigid parts and of those at rest is round-off, which never stays the same
+    # round-off energies of rigid or resting parts change during a fall
     unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
     still = find_stretches(np.append(False, unchanged), FEWEST)
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]

@@ -1,4 +1,4 @@
-"""Plan the rigid windows of a run: the times for every flight, and the windows that this reference run supports.
+"""Plan the rigid windows of a run: the times for each flight, and the windows supported by this reference run.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
@@ -26,7 +26,7 @@ from d2rpick.choice.switched.switched_run import (
     find_done_windows,
     prepare_switched_history,
 )
-from d2rpick.choice.td.flights import compute_last_td, find_flights
+from d2rpick.choice.td.flights import MIN_RIGID, compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
@@ -41,11 +41,9 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# Rigid windows shorter than this share of the record save less than a restart costs [-].
-MIN_RIGID: Final = 0.05
-# A window is left out for a later one that is more than this factor longer [-]. With w rigid in the first and W in the
-# other, one after the other saves w in the next run and w + W in the run after that. The other alone saves W in both
-# runs, which is more if W > 2 w.
+# A window is left out for a later one that is longer by more than this factor [-].
+# With the windows w and W one after the other, the next run saves w, and the run after it w + W.
+# The other window alone saves W in both runs, which is more if W > 2 w.
 _LONGER: Final = 2.0
 
 
@@ -96,12 +94,12 @@ class PlannedFlight(NamedTuple):
 
     @property
     def decision(self) -> Decision | None:
-        """Verdict on the pair as in ``suggest``; None without a pair, or if it is done."""
+        """Verdict on the pair as in ``suggest``; None without a pair, or if the window is done."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the pair as in ``suggest``; None without a window, or if it is done."""
+        """Grade of the pair as in ``suggest``; None without a window, or if the window is done."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
@@ -133,7 +131,7 @@ class RunPlan:
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
-        """Flights whose windows this reference run supports."""
+        """Flights whose windows are supported by this reference run."""
         return tuple(row for row in self.flights if row.status == "supported")
 
     @property
@@ -143,7 +141,7 @@ class RunPlan:
 
     @property
     def all_windows(self) -> tuple[Times, ...]:
-        """(tr, td) of all windows that are not done, including those that wait for a switched run [time]."""
+        """(tr, td) of all windows that are not done, including those that need a switched run first [time]."""
         return tuple(
             row.window
             for row in self.flights
@@ -152,7 +150,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """(tr, td) of the next run, in order: the done and the supported windows; empty without new ones [time].
+        """(tr, td) of the next run: the done and the supported windows; empty without new ones [time].
 
         The next run starts again from the beginning, so it needs both.
         """
@@ -238,7 +236,7 @@ def _list_rows(
     shortest: float,
     done_rows: Sequence[DoneWindow],
 ) -> Iterator[PlannedFlight]:
-    """Yield every flight with its window, as if each were the first."""
+    """Yield every flight with its window, planned as if it were the first."""
     last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # end of the previous flight
@@ -285,7 +283,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Return the row with the suggestion for its flight, which does not reach back beyond the previous landing.
+    """Return the row with the suggestion for its flight, which starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
@@ -296,7 +294,7 @@ def _suggest_window(
     flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
         flight_settings = replace(flight_settings, landing=None)
-    # the energy alone may show no end of the flight to a td in it: keep the margin before the listed end
+    # the energy alone may not show the end of the flight to td, so keep the margin before the listed end
     window = row.start, compute_last_td(row.end, row.margin.time)
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
@@ -322,7 +320,7 @@ def _suggest_window(
 
 
 def _explain_grade(decision: Decision, pair: Pair) -> str:
-    """Explain why a pair is not planned, and how to plan it nevertheless."""
+    """Explain why a pair is not planned, and how to plan it anyway."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     advice = f"with `min_quality` {decision.grade} it is planned nevertheless"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
@@ -341,7 +339,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
-    """Leave out each window that locks in energy before a much longer one, even if that has to wait for a run."""
+    """Leave out each window that locks in energy before a much longer one, which then may need a further run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         longest_after = max(
