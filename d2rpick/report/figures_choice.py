@@ -422,7 +422,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     for axes in panels:
         for offer, colour, name in (
-            (trade_off.asked, FLIGHT, "td asked for"),
+            (trade_off.requested, FLIGHT, "td asked for"),
             (trade_off.recommended, SWITCHED, "recommended"),
         ):
             if offer:

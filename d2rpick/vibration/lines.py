@@ -34,7 +34,7 @@ FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], else half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
 # States of the even grid in a period of the fastest relevant line, and the fewest and most states in all.
-_STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
+_STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
 # Times are even if they deviate by less than this share of a step, as single precision and printed digits do.
 _EVEN: Final = 1e-3
 # The power of white noise hardly exceeds this many times its median.

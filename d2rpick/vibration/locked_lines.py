@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 # A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record.
-_SAME_RATE: Final = 0.1
+# Two rates are one if they differ by less than this share of a turn over the record, and exactly one if they differ by
+# less than this angle, beside what scatter may add [rad].
+_SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
@@ -34,12 +35,14 @@ class StretchLine(NamedTuple):
     """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy].
 
     ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
+    ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
     """
 
     line: int
     of_mode: int
     energy: float
     swings: bool = False
+    is_exact: bool = True
 
 
 def find_stretches(
@@ -65,18 +68,18 @@ def find_stretches(
                 _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
             ):
                 continue
-            if abs(rate[own_line] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
-                continue
             unsure = 3 * min(scatter / size[own_line] + 2 * scatter / size[line], 0.1)
+            apart = abs(rate[own_line] - 2 * rate[line]) * span
+            if apart > 2 * np.pi * _SAME_RATE:
+                continue
             if (
                 abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
                 < _SAME_PHASE + unsure
             ):
-                stretches.append(
-                    StretchLine(
-                        line, own_line, float(size[line] ** 2 / (8 * size[own_line]))
-                    )
-                )
+                # a fit knows a rate over the record sqrt(12) times worse than a phase
+                is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
+                energy = float(size[line] ** 2 / (8 * size[own_line]))
+                stretches.append(StretchLine(line, own_line, energy, is_exact=is_exact))
                 break
     side_lines = _find_side_lines(lines, span, scatter)
     no_modes = {stretch.line for stretch in side_lines}

@@ -80,8 +80,9 @@ _FINER: Final = 4
 # share.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# Initial half-width of the band of R^2, before it is widened for known errors.
-_LEAST_HALF: Final = 0.006
+# Half-width of the band of R^2 before it is widened for known errors, and how far a solver's structure is from a linear
+# one, relative to its deformation [-]: R of pairs of a shell box is off by 0.015 to 0.018 rms against all its nodes.
+_LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 _VAGUE_HALF: Final = (
     0.2  # half-width of R^2 of vague modes; well-identified ones have 0.02 to 0.1
 )
@@ -209,7 +210,7 @@ class ModalVibration:
         Second harmonic of a line that is, or may be, that of a stiffening spring, over the line; 0 without one [-].
     source : str
         The energy that the lines were found in.
-    second : Reading or None
+    second : ModalVibration or None
         What the lines of the kinetic energy say, beside those of the internal energy.
     last_resort : bool
         Whether nothing better is known, so that more doubts are allowed.
@@ -227,7 +228,7 @@ class ModalVibration:
     swinging: float = 0.0
     bent: float = 0.0
     source: str = "internal energy"
-    second: Reading | None = None
+    second: ModalVibration | None = None
     last_resort: bool = False
     kinetic: ClassVar = ""
     undescribed: ClassVar = "outside the part of the flight whose modes were identified"
@@ -350,22 +351,23 @@ class ModalVibration:
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         width_of_neglected = np.zeros_like(squared)
         if self.second is not None:
-            width_of_neglected = np.abs(self.second.residual_squared(tr, td) - squared)
+            second = self.second.reading.residual_squared(tr, td)
+            room = self.second.half_width(tr, td)
+            width_of_neglected = np.maximum(np.abs(second - squared) - room, 0.0)
         return np.asarray(
-            (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
+            _LEAST_HALF
+            + _compute_effect_of_deformation(_NOT_LINEAR, squared)
+            + min(self._wrong, 1.0) * (1 + np.abs(squared - 1))
             + np.minimum(of_lines, np.maximum(squared, 1.0))
             + of_rest
             + self._phase_share * squared
-            + self._compute_effect_of_swinging(squared, level)
+            + _compute_effect_of_deformation(
+                np.sqrt(_SWINGING_COUNTS * self.swinging / level), squared
+            )
             + self.bent * (_BENT_ALIKE + _BENT_ACROSS * _compute_sine(squared))
             + width_of_neglected
             + self._of_other_readings(tr, td, squared)
         )
-
-    def _compute_effect_of_swinging(self, squared: Samples, level: Samples) -> Samples:
-        """Return how far R^2 may be off since a stretch differs at tr and td, where modes have ``squared`` [-]."""
-        apart = np.sqrt(_SWINGING_COUNTS * self.swinging / level)
-        return np.asarray(2 * apart * np.sqrt(squared) + apart**2)
 
     @property
     def _structure_of_rest(self) -> float:
@@ -496,13 +498,13 @@ def identify_modal(
 def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Return the result of the internal energy, its band widened to that of the kinetic energy, else the latter."""
+    """Return the result of the internal energy, its band widened towards that of the kinetic one, else the latter."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
         return kinetic
     if internal.signed:
-        return replace(internal, second=kinetic.reading)
+        return replace(internal, second=kinetic)
     return kinetic if _can_decide(internal, kinetic) else internal
 
 
@@ -579,10 +581,12 @@ def _read(
     hidden = _find_most_hidden(remainder)
     unresolved = share * mean < hidden / 2
     no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
+    if ambiguous and not all(stretch.is_exact for stretch in stretches):
+        no_static = True
     reading = plain if no_static else with_static
     other_readings: tuple[Reading, ...] = ()
     if ambiguous:
-        other_readings = (plain,)
+        other_readings = (with_static if no_static else plain,)
     elif may_be_spring and stretches:
         other_readings = (replace(with_static, is_mode=plain.is_mode),)
     elif not stretches and not kinetic:
@@ -636,6 +640,11 @@ def _find_most_hidden(rest: Samples) -> float:
     highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
     most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
     return float(2 * _HIDDEN_LINES * min(highest, most_together))
+
+
+def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
+    """Return how far R^2 may be off if the difference of two deformations is off by a share ``off`` of them [-]."""
+    return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 
 def _compute_sine(squared: Samples) -> Samples:

@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -26,7 +27,8 @@ def residual_band(
     """Return the residual of each tr (n,), and the lowest and highest that the record allows [-].
 
     If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
-    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.
+    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best; if it may hold more than any
+    solver leaves, the middle between both is stated.
 
     Parameters
     ----------
@@ -46,8 +48,13 @@ def residual_band(
     share = measures.phase_share(mode.alpha, mode.omega)
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent
-    hidden = fit.hidden_share * _count_opposed(fit, tr, td)
-    return measures.band_about(squared, off, hidden, fit.hidden_share * squared)
+    opposed = _count_opposed(fit, tr, td)
+    stated_now, low, high = measures.band_about(
+        squared, off, fit.hidden_share * opposed, fit.hidden_share * squared
+    )
+    # more than a solver leaves: such a mode is as likely as none, so the middle is stated
+    notable = max(fit.hidden_share - SMALLEST, 0.0) * opposed
+    return np.sqrt(np.square(stated_now) + notable / 2), low, high
 
 
 def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:

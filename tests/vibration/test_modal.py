@@ -90,7 +90,7 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
         < 0.02
     )
     confirmed = require(confirm_by_kinetic_energy(internal, kinetic))
-    assert confirmed.second is kinetic.reading
+    assert confirmed.second is kinetic
     assert np.all(confirmed.half_width(*PAIRS) >= internal.half_width(*PAIRS))
 
 

@@ -24,7 +24,7 @@ from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
-from d2rpick.vibration.measures import kinetic_share, vertices
+from d2rpick.vibration.measures import TOLERATED_GROWTH, kinetic_share, vertices
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -445,7 +445,8 @@ def _choose_by_modes(
     if good:
         return _find_best_of_long(good)[0].td, longest
     least_error = min(best.error for _, best in choices[0])
-    limit = least_error + get_limit_of_like_quality(situation)
+    # no more than a change of tr within its timing tolerance may add
+    limit = least_error + TOLERATED_GROWTH
     alike = _find_longest(pair for pair in choices[0] if pair[1].error <= limit)
     return _get_td(alike), longest
 

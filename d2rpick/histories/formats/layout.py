@@ -12,8 +12,8 @@ from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.cells import (
     find_thousands,
+    has_number,
     is_missing,
-    is_number,
     is_skipped,
     is_word,
     parse_cell,
@@ -147,7 +147,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
         cell
         for row in rows
         for cell in row
-        if not is_number(cell, table.decimal, table.thousands) and not is_missing(cell)
+        if not has_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     if odd:
         return table._replace(thousands=find_thousands(odd, table.decimal))
@@ -164,7 +164,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     below = "below" if text.is_short else f"in the first {HEAD} lines"
     problem = f"{text.name}:{number}: {quote_start(line)} and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
-    if rows and is_number(line.strip(), ".", ""):
+    if rows and has_number(line.strip(), ".", ""):
         cure = "this file has one column; add the times"
     return FormatError(f"{problem}; expected a table of time and energy; {cure}")
 
