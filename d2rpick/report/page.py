@@ -502,6 +502,7 @@ def build_solver_input(
             "details",
             make_element("summary", "Show the card that must not be used"),
             *contents,
+            class_="unused",
         ),
     )
 
