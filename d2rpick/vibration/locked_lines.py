@@ -1,4 +1,4 @@
-"""Find lines of an energy that are locked to other lines: lines of a stretch, and harmonics of a nonlinear spring."""
+"""Find lines of an energy that are locked to others: lines of a static stretch, and harmonics of nonlinear springs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
-# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+# Smallest relevant line relative to the strongest line, the same relative to a partner line, and in units of scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record.
-_SAME_RATE: Final = 0.1
-# Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
+# Two rates are equal if they differ by less than this share of a turn over the record.
+# They are exactly equal if they differ by less than this angle [rad], beside what scatter may add.
+_SAME_RATE, _EXACT_RATE = 0.1, 0.1
+# Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
 # is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
@@ -34,18 +35,20 @@ class StretchLine(NamedTuple):
     """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy].
 
     ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
+    ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
     """
 
     line: int
     of_mode: int
     energy: float
     swings: bool = False
+    is_exact: bool = True
 
 
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
 ) -> tuple[StretchLine, ...]:
-    """Find the lines of modes that vibrate about a stretch, as in a spinning body.
+    """Find the lines of modes that vibrate about a static stretch, as in a rotating body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
@@ -65,18 +68,18 @@ def find_stretches(
                 _NOTABLE_PARTNER * strongest, ABOVE_SCATTER * scatter
             ):
                 continue
-            if abs(rate[own_line] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
-                continue
             unsure = 3 * min(scatter / size[own_line] + 2 * scatter / size[line], 0.1)
+            apart = abs(rate[own_line] - 2 * rate[line]) * span
+            if apart > 2 * np.pi * _SAME_RATE:
+                continue
             if (
                 abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
                 < _SAME_PHASE + unsure
             ):
-                stretches.append(
-                    StretchLine(
-                        line, own_line, float(size[line] ** 2 / (8 * size[own_line]))
-                    )
-                )
+                # a fit knows a rate over the record sqrt(12) times worse than a phase
+                is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
+                energy = float(size[line] ** 2 / (8 * size[own_line]))
+                stretches.append(StretchLine(line, own_line, energy, is_exact=is_exact))
                 break
     side_lines = _find_side_lines(lines, span, scatter)
     no_modes = {stretch.line for stretch in side_lines}
@@ -89,7 +92,7 @@ def find_stretches(
 def _find_side_lines(
     lines: Exponentials, span: float, scatter: float
 ) -> list[StretchLine]:
-    """Find the lines of modes about stretches that swing.
+    """Find the side lines of modes whose static stretch oscillates.
 
     A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
     their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
@@ -189,7 +192,7 @@ def measure_third_harmonic(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Return the size of lines at 3 and more times the rate of a line, with locked phases, relative to it [-].
+    """Return the relative size of phase-locked lines at 3 and more times the rate of a line [-].
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
@@ -212,7 +215,7 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Return the size of a line's harmonics beyond the second, up to the first one not locked, relative to it [-]."""
+    """Return the relative size of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))
@@ -228,7 +231,7 @@ def _measure_locked_to(
         if times > 2:
             if (
                 size[line] > size[first]
-            ):  # a harmonic is never stronger than its line: these are modes
+            ):  # a harmonic is never stronger than its line, so these lines are modes
                 return 0.0
             total += float(size[line] / size[first])
     return total
@@ -240,5 +243,5 @@ def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
 
 
 def _wrap(angle: float, turn: float) -> float:
-    """Return an angle within half a turn of zero [rad]."""
+    """Return an angle between minus and plus half a turn [rad]."""
     return (angle + turn / 2) % turn - turn / 2
