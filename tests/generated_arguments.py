@@ -10,7 +10,7 @@ from textwrap import fill
 
 from d2rpick.api.request import Request
 from d2rpick.base.options import list_options
-from d2rpick.choice.options import CHOOSING, CHOOSING_FOR_CARDS, ChoiceOptions
+from d2rpick.choice.options import ChoiceOptions, list_uses
 from tests.command import ROOT
 
 MODULE = ROOT / "d2rpick" / "api" / "choosing.py"
@@ -81,11 +81,12 @@ def write_class(
 
 def write_module() -> str:
     """Return the text of the module."""
-    others = tuple(name for name in CHOOSING if name not in CHOOSING_FOR_CARDS)
+    of_cards = tuple(name for name, use in list_uses().items() if use.of_cards)
+    others = tuple(name for name in list_uses() if name not in of_cards)
     judging = write_class(
         "JudgingOptions(TypedDict, total=False)",
         "How a pair is judged; times in the unit of the history.  None stands for the default.",
-        list_arguments(CHOOSING_FOR_CARDS),
+        list_arguments(of_cards),
     )
     choosing = write_class(
         "Choosing(JudgingOptions, total=False)",

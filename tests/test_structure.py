@@ -38,6 +38,9 @@ RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for type
 
 LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
 PRINTS = re.compile(r"\b(?:print|exit|write)\(")
+WRITES = re.compile(
+    r"""\.(?:write_text|write_bytes|savefig|copyfile)\(|\bopen\([^)]*["']\w*[wax]\+?b?["']"""
+)
 SWAP = re.compile(r"\.(?:set|del)(?:attr|item)\b")
 # Modules of the standard library and of numpy that slow down the start and that an answer to a plain table does not
 # need.
@@ -226,6 +229,18 @@ def test_only_the_command_line_prints_and_exits() -> None:
         for module, name in called
         if name in ("print", "exit", "sys.exit", "sys.stdout.write", "sys.stderr.write")
     }
+
+
+def test_every_output_file_is_written_as_a_whole() -> None:
+    """`write_as_a_whole` keeps the mode of a file that it replaces."""
+    writing = {
+        module
+        for module, path in MODULES.items()
+        if WRITES.search(path.read_text("utf-8"))
+    }
+    into_memory = {"report.figures"}
+    appending = {"api.studies", "running.engine"}  # rows of a study, logs of the solver
+    assert writing == {"base.files"} | into_memory | appending
 
 
 def list_swapped(tree: ast.Module) -> Iterator[str]:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from d2rpick.api.request import OPTIONS, Request
 from d2rpick.base.errors import DeckError
-from d2rpick.base.options import TIME, Number, Option
+from d2rpick.base.options import TIME, Option
+from d2rpick.base.ranges import Number
 
 if TYPE_CHECKING:
     from typing import Literal

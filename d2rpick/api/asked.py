@@ -98,7 +98,7 @@ def make_request(
     return find_deck_in_folder(request)
 
 
-def open_run(request: Request, names: Sequence[str] = ()) -> Run:
+def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
     """Open the run of the request, or other files in the same way."""
     from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
-from d2rpick.api.request import OPTIONS, Request
+from d2rpick.api.request import CHOOSING_FOR_CARDS, OPTIONS, Request
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.options import (
     POSITIVE,
@@ -19,7 +19,6 @@ from d2rpick.base.options import (
     make_option_name,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.options import CHOOSING_FOR_CARDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -150,7 +149,7 @@ class Cards:
         """Return what is printed with the given options, and these parts to switch."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
-            values["node"] = tuple(parse_numbers("--node", self.node))
+            values["node"] = tuple(parse_id_ranges("--node", self.node))
         solver = self.solver or printing.solver
         return printing._replace(solver=solver, part=tuple(parts), **values)
 
@@ -190,7 +189,7 @@ class Cards:
         from d2rpick.deck.printing import find_solver
 
         printing, notes = self._suit_deck(question)
-        parts = parse_numbers("--part", question.on_card)
+        parts = parse_id_ranges("--part", question.on_card)
         printing = self.replace_in(printing, parts)
         history_format = question.reference.history.format
         self.check_solver(printing.solver or find_solver(history_format))
@@ -251,7 +250,7 @@ def name_needed_argument(solver: Module) -> str:
     return f"a card for {solver.title} needs {arguments_by_kind[solver.switches]}"
 
 
-def parse_numbers(name: str, texts: Sequence[str]) -> list[int]:
+def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
     """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
@@ -302,7 +301,7 @@ class JudgedCard(NamedTuple):
         )
 
 
-def print_judged_card(
+def judge_and_print(
     question: RunQuestion,
     cards: Cards,
     windows: Sequence[Times],
@@ -436,10 +435,10 @@ def print_card(
     question = ask_run(run, request, card_alone=True)
     solver = cards.solver or find_solver(question.reference.history.format)
     cards.check_solver(solver)
-    parts = parse_numbers("--part", question.on_card)
+    parts = parse_id_ranges("--part", question.on_card)
     if parts and SOLVERS[solver].switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(SOLVERS[solver].title))
-    return print_judged_card(question, cards, windows)
+    return judge_and_print(question, cards, windows)
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
@@ -458,4 +457,4 @@ def _complete_alone(request: Request, cards: Cards) -> Printing:
         raise ArgumentError(
             f"a card for {module.title} needs `end`, the end of the run, or a `run`"
         )
-    return cards.replace_in(Printing(), parse_numbers("--part", request.part))
+    return cards.replace_in(Printing(), parse_id_ranges("--part", request.part))

@@ -290,7 +290,7 @@ def _check_one(
         source = configuration.source
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:
-            judge.beside(name)
+            judge.use_deck(name)
         result = check_deck(name, configuration, judge, content, restarts)
         return result._replace(files=(source, *result.files), notes=configuration.notes)
     except Exception as error:

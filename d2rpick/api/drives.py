@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
-from d2rpick.api.cards import Cards, parse_numbers
+from d2rpick.api.cards import Cards, parse_id_ranges
 from d2rpick.base.errors import ConfigurationError, D2RPickError
 from d2rpick.choice.parts.cost import CostModel
 from d2rpick.choice.parts.deck_of_run import warn_about_solver
@@ -80,7 +80,7 @@ class Driving:
         self.name, self.folder, self._told = deck, folder, told
         self.commands = Commands(starter, engine, threads)
         self.deck = read_driven_deck(
-            deck, parse_numbers("--part", part) if part else ()
+            deck, parse_id_ranges("--part", part) if part else ()
         )
         self.inventory = read_inventory(deck)
         deck_wait = wait_of_deck(self.inventory)

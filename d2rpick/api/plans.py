@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard, print_judged_card
+from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE
@@ -137,10 +137,10 @@ def explore(
     window = arguments.check_time_window("td_window", td_window)
     count = arguments.check_whole_number("steps", _STEPS if steps is None else steps, 1)
     question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
-    return explore_run(question, wanted, window, count)
+    return explore_for_question(question, wanted, window, count)
 
 
-def explore_run(
+def explore_for_question(
     question: RunQuestion,
     td: float | None,
     td_window: tuple[float, float] | None,
@@ -198,7 +198,7 @@ class Plan(RunAnswer, planning.RunPlan):
         question = question._replace(
             reference=question.reference._replace(history=self.history)
         )
-        return print_judged_card(question, cards, new, done=self.done) if new else None
+        return judge_and_print(question, cards, new, done=self.done) if new else None
 
     def page(
         self,
@@ -278,17 +278,17 @@ def plan(
     >>> import d2rpick as d2
     >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="flying")
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
-    [(0.124, 0.37)]
+    [(0.143, 0.345)]
     """
     shortest = arguments.check_optional_number("min_rigid", min_rigid, NOT_NEGATIVE)
     windows = arguments.check_windows("done", done)
     if before is not None:
         arguments.check_run("before", before)
     question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
-    return plan_run(question, shortest, windows, before)
+    return plan_for_question(question, shortest, windows, before)
 
 
-def plan_run(
+def plan_for_question(
     question: RunQuestion,
     min_rigid: float | None,
     done: Sequence[Times],
@@ -302,10 +302,10 @@ def plan_run(
     windows: Sequence[Times] = ()
     if done:
         from d2rpick.deck.printed_card import (
-            check_windows,
+            refuse_overlapping_windows,
         )  # imported here since a plan alone needs no decks
 
-        windows = check_windows(done)
+        windows = refuse_overlapping_windows(done)
     earlier = (
         question.reference.like(before.files, question.selection) if before else None
     )
@@ -328,7 +328,7 @@ def plan_run(
     return Plan.about(question, result, *times)
 
 
-def write_deck(
+def write_planned_deck(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
     """Write a copy of a plan's deck with the card of the plan, and check the copy by the history.

@@ -14,19 +14,18 @@ from d2rpick.base.options import (
     NOT_NEGATIVE,
     POSITIVE,
     TIME,
-    Number,
     Option,
     list_options,
     make_option,
     make_option_name,
 )
-from d2rpick.choice import options
-from d2rpick.choice.options import ChoiceOptions
+from d2rpick.choice.options import ChoiceOptions, list_uses
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
+    from d2rpick.base.ranges import Number
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
@@ -39,10 +38,18 @@ _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 _MODEL: Final = (*OSCILLATOR, "no_verify")
 # Options that say how a pair is chosen, how those of sets of parts and of many runs are, and how cards are judged.
-CHOOSING: Final = (*options.CHOOSING, *_MODEL)
-CHOOSING_FOR_SETS: Final = (*options.CHOOSING_FOR_SETS, *_MODEL)
-ADVANCED: Final = (*_MODEL, *options.ADVANCED)
-JUDGING: Final = (*_READING_FOR_CARDS, *options.CHOOSING_FOR_CARDS)
+_USES: Final = list_uses()
+CHOOSING: Final = (*_USES, *_MODEL)
+CHOOSING_FOR_SETS: Final = (
+    *(name for name, use in _USES.items() if use.of_sets),
+    *_MODEL,
+)
+CHOOSING_FOR_CARDS: Final = tuple(name for name, use in _USES.items() if use.of_cards)
+ADVANCED: Final = (
+    *_MODEL,
+    *(name for name, use in _USES.items() if use.is_advanced),
+)
+JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights that are no file: typed as it is, the command line is refused, so that it never uses other
 # weights.
@@ -118,7 +125,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Rate of damping proportional to mass.", NOT_NEGATIVE
     )
     v0: float | None = _make_oscillator_option(
-        "Velocity of the frame at time 0; the rest is at rest.", TIME, "vz0"
+        "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
     )
     no_verify: bool = make_option(
         "Judge by the energy level alone, without an oscillator.",
@@ -222,7 +229,7 @@ class Request(ChoiceOptions, ReadingOptions):
         # the settings have their own defaults for what the question leaves open
         chosen = {
             name: getattr(self, name)
-            for name in options.CHOOSING
+            for name in _USES
             if getattr(self, name) is not None
         }
         return Settings(**chosen, oscillator=mode, replay=not self.no_verify)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
-from d2rpick.api.cards import parse_numbers
+from d2rpick.api.cards import parse_id_ranges
 from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.histories.names import Selection
 
@@ -87,7 +87,7 @@ def first(
     )
     main = arguments.check_path("deck", deck)
     folder = arguments.check_path("output_dir", output_dir)
-    copies = first_card(main, parse_numbers("parts", names), *times)
+    copies = first_card(main, parse_id_ranges("parts", names), *times)
     files = write_deck(
         main,
         copies.card,

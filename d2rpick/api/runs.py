@@ -54,9 +54,9 @@ class Run:
         return self.sources, digests, self.chosen, self.input_format
 
     def __repr__(self) -> str:
-        from d2rpick.report.pages import describe_run
+        from d2rpick.report.pages import summarise_files
 
-        return f"Run({describe_run(self.files)})"
+        return f"Run({summarise_files(self.files)})"
 
     def _repr_html_(self) -> str | None:
         from d2rpick.report.pages import show_at_a_glance

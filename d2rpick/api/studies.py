@@ -135,7 +135,7 @@ def study(
     )  # fmt: skip
     question = make_question(request, td_or_window, curve=True)
     with choose_farm(min(processes, len(names)), "d2rpick.choice.runs.study") as farm:
-        return compare_rows(
+        return answer_study(
             request, question, names, list(compute_rows(question, names, farm))
         )
 
@@ -166,7 +166,7 @@ def make_question(
     )
 
 
-def compare_rows(
+def answer_study(
     request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]
 ) -> Study:
     """Compare the rows of all runs."""

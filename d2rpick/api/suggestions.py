@@ -13,7 +13,7 @@ from d2rpick.api.cards import (
     CardOptions,
     Cards,
     JudgedCard,
-    print_judged_card as card_judged,
+    judge_and_print as card_judged,
 )
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
 from d2rpick.base.errors import ArgumentError

@@ -8,29 +8,14 @@ from __future__ import annotations
 
 from dataclasses import field, fields
 from functools import cache
-from math import inf
 from typing import Any, Final
 
+from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
 # End of a range of whole numbers without upper limit.
 UNLIMITED: Final = 2**63
-
-
-class Number(NamedTuple):
-    """A finite number from ``low`` (or above it, if ``above``) to ``high``."""
-
-    low: float = -inf
-    high: float = inf
-    above: bool = False
-
-    def missed(self, value: float) -> str:
-        """Return the limit that a value violates as text, empty if the value is allowed."""
-        if value < self.low or (self.above and value == self.low):
-            return f"{'above' if self.above else 'of at least'} {self.low:g}"
-        return f"of at most {self.high:g}" if value > self.high else ""
-
-
+# Ranges of numbers: any, above 0, from 0 on, from 0 to 1, from 1 on.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)

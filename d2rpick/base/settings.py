@@ -120,7 +120,9 @@ def format_toml_value(value: object) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 
-def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) -> None:
+def refuse_unknown_settings(
+    names: Iterable[str], known: Collection[str], source: str
+) -> None:
     """Raise ConfigurationError, with the most similar key, for the first key that is not ``known``."""
     for name in names:
         if name not in known:

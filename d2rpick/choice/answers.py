@@ -19,7 +19,7 @@ from d2rpick.choice.health import (
     warn_about_engine,
     warn_about_health,
 )
-from d2rpick.choice.pair.aftermath import Kept, bound_mean_energy
+from d2rpick.choice.pair.aftermath import MeanEnergyBounds, bound_mean_energy
 from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair, judge_times
 from d2rpick.choice.pair.decision import (
     CHECK_SWITCHED_RUN,
@@ -141,7 +141,7 @@ class PairVerdict(AnswerAtTd):
         return self.decision.quality if self.admissible else None
 
     @cached_property
-    def kept(self) -> Kept | None:
+    def mean_energy_bounds(self) -> MeanEnergyBounds | None:
         """Bounds of the mean energy after td, over that of the reference run; None if they are unknown."""
         return bound_mean_energy(self.situation, self.candidate)
 
@@ -194,7 +194,7 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
         candidate=candidate,
         tr_ok=candidate.admissible if is_known else None,
         td_ok=td_ok,
-        admissible=bool(judged.kept[0]),
+        admissible=bool(judged.recommendable[0]),
         reasons=(*candidate.notes, *(excess.message for excess in exceeded)),
         cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
@@ -315,7 +315,7 @@ class PairSuggestion(AnswerAtTd):
         return self.decision.quality if self.decision else None
 
     @cached_property
-    def kept(self) -> Kept | None:
+    def mean_energy_bounds(self) -> MeanEnergyBounds | None:
         """Bounds of the mean energy after td for the recommended tr, over that of the reference; None if unknown."""
         return bound_mean_energy(self.situation, self.chosen) if self.chosen else None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from d2rpick.base.options import (
     AT_LEAST_ONE,
@@ -183,14 +183,3 @@ class ChoiceOptions:
 def list_uses() -> dict[str, Use]:
     """Return how each option of a choice is used, by the names of the options."""
     return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}
-
-
-# Options of a choice: all, those for sets of parts and many runs, those for cards and decks, and those that few need.
-CHOOSING: Final = tuple(list_uses())
-CHOOSING_FOR_SETS: Final = tuple(
-    name for name, use in list_uses().items() if use.of_sets
-)
-CHOOSING_FOR_CARDS: Final = tuple(
-    name for name, use in list_uses().items() if use.of_cards
-)
-ADVANCED: Final = tuple(name for name, use in list_uses().items() if use.is_advanced)

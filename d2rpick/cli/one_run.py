@@ -232,13 +232,13 @@ def explore(
     d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask_run
-    from d2rpick.api.plans import explore_run
+    from d2rpick.api.plans import explore_for_question
 
     check_window("td_window", td_window)
     output.check(cards)
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-    answer = explore_run(question, td, td_window, steps)
+    answer = explore_for_question(question, td, td_window, steps)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
@@ -290,7 +290,7 @@ def verify(
     d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
     d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
     """
-    from d2rpick.api.asked import ask_run, open_run
+    from d2rpick.api.asked import ask_run, open_requested_run
     from d2rpick.api.suggestions import check_pair, judge_pair
 
     check_pair(tr, td, switched)
@@ -300,7 +300,7 @@ def verify(
     switched_run = None
     if switched:
         with show_reading(switched, quiet=output.quiet):
-            switched_run = open_run(request, switched)
+            switched_run = open_requested_run(request, switched)
         output.spare(switched_run.sources)
     answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
     output.notes(question.reference.history.notes, answer.cautions)
@@ -427,8 +427,8 @@ def plan(
     d2rpick plan --part flying -f card sample_data/rollover_box.matsum
     d2rpick plan --part flying --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
-    from d2rpick.api.asked import ask_run, open_run
-    from d2rpick.api.plans import plan_run
+    from d2rpick.api.asked import ask_run, open_requested_run
+    from d2rpick.api.plans import plan_for_question
 
     form = output.output_format
     if every and form not in ("value", "card") and not write_deck:
@@ -447,8 +447,8 @@ def plan(
             ]
         ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
-        earlier = open_run(request, before) if before else None
-    answer = plan_run(
+        earlier = open_requested_run(request, before) if before else None
+    answer = plan_for_question(
         question, min_rigid, options.read_windows_in(done) if done else (), earlier
     )
     output.notes(answer.history.notes, answer.cautions)
@@ -515,9 +515,9 @@ def _write_and_check(
     passed : bool
         True if no finding is an error.
     """
-    from d2rpick.api.plans import write_deck
+    from d2rpick.api.plans import write_planned_deck
 
-    names, checked = write_deck(plan, card, folder, overwrite=output.overwrite)
+    names, checked = write_planned_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
     return "\n".join(
         [*listed, "", checked.text("table", output.shown())]

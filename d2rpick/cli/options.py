@@ -348,10 +348,10 @@ def open_judging_run(request: Request) -> Run | None:
     if not request.history:
         return None
     from d2rpick.api.asked import (
-        open_run,
+        open_requested_run,
     )  # imported here since nothing is computed without a history
 
-    return open_run(request)
+    return open_requested_run(request)
 
 
 def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -> None:

@@ -424,10 +424,10 @@ def open_with_output(
 
     Everything that reads from the run belongs inside this context.
     """
-    from d2rpick.api.asked import open_run
+    from d2rpick.api.asked import open_requested_run
 
     request.selection()  # refuses contradictory options before a file is opened
     with show_reading(request.history, quiet=output.quiet):
-        run = open_run(request)
+        run = open_requested_run(request)
         weights = request.weights if isinstance(request.weights, str) else None
         yield run, output.beside(*run.sources, request.deck, weights, *inputs)

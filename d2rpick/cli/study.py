@@ -88,7 +88,7 @@ def study(
     """
     from d2rpick.api.studies import (
         Ledger,
-        compare_rows,
+        answer_study,
         compute_fingerprint,
         compute_rows,
         make_question,
@@ -124,7 +124,7 @@ def study(
             rows.append(row)
             if streaming:
                 output.result(write_row(row, mark))
-    answer = compare_rows(request, question, sources, rows)
+    answer = answer_study(request, question, sources, rows)
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
     output.beside_answer(answer, lambda: answer.page(options.repeat_command()))

@@ -13,8 +13,9 @@ from click.core import ParameterSource
 from d2rpick.api.cards import SETTINGS, Cards, list_solvers
 from d2rpick.api.request import JUDGING, write_option
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.options import UNLIMITED, Number, list_options
-from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown
+from d2rpick.base.options import UNLIMITED, list_options
+from d2rpick.base.ranges import Number
+from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown_settings
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -308,15 +309,15 @@ def _list_given_settings(
             raise ConfigurationError(
                 f"{source}: {name} is {format_toml_value(shared[name])}, a table was expected"
             )
-    refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
-    refuse_unknown(tables, (*COMMANDS, "severity"), source)
+    refuse_unknown_settings(shared, (*RULE_KEYS, *SETTINGS), source)
+    refuse_unknown_settings(tables, (*COMMANDS, "severity"), source)
     options = {
         spell_option(entry): entry
         for entry in command.params
         if isinstance(entry, click.Option)
     }
     own_table = tables.get(command.name or "", {})
-    refuse_unknown(own_table, options, f"{source}: {command.name}")
+    refuse_unknown_settings(own_table, options, f"{source}: {command.name}")
     for name, value in {**shared, **own_table}.items():
         if name in options:
             yield options[name], value, f"{source}: {name}"

@@ -23,7 +23,7 @@ from d2rpick.deck.expression import (
     convert_text,
     evaluate,
     find_parameters,
-    is_number,
+    is_deck_number,
     parse_number,
 )
 from d2rpick.deck.ls_dyna_columns import PARAMETER_FLAG, PARAMETERS
@@ -430,7 +430,7 @@ class Scope:
             value = text.strip().strip('"')
         else:
             try:
-                if uses or not is_number(text):
+                if uses or not is_deck_number(text):
                     value = evaluate(text, self._number)
                 else:
                     value = parse_number(text)

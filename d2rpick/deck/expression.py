@@ -57,7 +57,7 @@ def parse_number(text: str) -> Number:
     return _check_range(float(f"{mantissa}e{exponent or 0}"))
 
 
-def is_number(text: str) -> bool:
+def is_deck_number(text: str) -> bool:
     """Return True if `number` can read the text."""
     try:
         parse_number(text)

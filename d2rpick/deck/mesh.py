@@ -14,7 +14,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import name_units
 from d2rpick.deck.expression import ExpressionError, parse_real
-from d2rpick.deck.radioss_columns import NODE, make_element_line
+from d2rpick.deck.radioss_columns import NODE, make_radioss_element_line
 from d2rpick.deck.radioss_deck import Starter, get_number
 
 if TYPE_CHECKING:
@@ -380,7 +380,7 @@ def read_elements(
     With ``damaged`` also yield elements whose ids are incomplete.
     """
     kind = KINDS[card.words[0]]
-    fields = make_element_line(max(kind.lines)).layout
+    fields = make_radioss_element_line(max(kind.lines)).layout
     line_ids = [
         lines.integers(fields) for lines in read_lines(card, _COMMENTS) if len(lines)
     ]

@@ -174,7 +174,7 @@ def write_comments(remarks: Sequence[str]) -> Iterator[str]:
         )
 
 
-def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
+def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
     """Return the windows with positive zeros; DeckError unless each begins after the one before."""
     if not windows:
         raise DeckError("no window was given, expected at least one tr and td")

@@ -104,7 +104,7 @@ def _print_ls_dyna(
     DeckError
         If windows overlap or are not in order, as given or as printed, or an id does not fit.
     """
-    windows = printed_card.check_windows(windows)
+    windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
@@ -196,7 +196,7 @@ def _print_ls_dyna_contact(
         find_pair_timing,
     )  # not above: other cards do without
 
-    windows = printed_card.check_windows(windows)
+    windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
     kind, number, pushes = _find_force(printing)
     free, forced = _CODES[kind]
@@ -485,7 +485,7 @@ def _check_run(
     DeckError
         If a window, a main node, the name or the end is missing or wrong.
     """
-    windows = printed_card.check_windows(windows)
+    windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.node)
     if not _RUN_NAME.fullmatch(printing.name):
         raise DeckError(

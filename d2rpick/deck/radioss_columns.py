@@ -99,7 +99,7 @@ AFTER_DELAY: Final = DataLine(blank(_REAL), words("number", _REAL))
 RUN: Final = DataLine(reals("Tstop", _REAL))
 
 
-def make_element_line(id_count: int) -> DataLine:
+def make_radioss_element_line(id_count: int) -> DataLine:
     """Return a line of elements with this number of ids."""
     names = " ".join(f"ID{number}" for number in range(1, id_count + 1))
     return DataLine(integers(names))

@@ -21,3 +21,8 @@ class ResumePoint(NamedTuple):
         with open(name, "rb") as stream:  # noqa: PTH123  start-up
             stream.seek(self.begin)
             return self.head + stream.read()
+
+    def locate(self, point: ResumePoint) -> ResumePoint:
+        """Return a point that was found in what `read_on` gave with its addresses in the file."""
+        skipped = self.begin - len(self.head)
+        return ResumePoint(point.head, point.begin + skipped, point.end + skipped)

@@ -391,7 +391,7 @@ def scan(
                 raise answer.error
             ready[answer.number] = answer.result
             while following in ready:
-                yield compare_runs(
+                yield compare_box_runs(
                     reference, ready.pop(following), ordered[following], td
                 )
                 following += 1
@@ -411,7 +411,9 @@ def _compute_switched_run(branch: tuple[BoxMotion, float, RigidWindow]) -> Recor
     return continue_motion(*branch)
 
 
-def compare_runs(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
+def compare_box_runs(
+    reference: Record, switched: Record, tr: float, td: float
+) -> Outcome:
     """Compare a switched run, which may begin at tr, with the reference run at td and from td to the landing."""
     interval = _find_interval(reference)
     at = round(td / interval)

@@ -158,7 +158,7 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
     history = situation.history
     flight = situation.flight
     first = (
-        trade_off.asked
+        trade_off.requested
         or trade_off.recommended
         or trade_off.start
         or trade_off.offers[-1]
@@ -333,7 +333,7 @@ def _list_texts_of_best(
     offer: Offer, best: Candidate, unit: str
 ) -> dict[str, str | None]:
     """Return the texts about the recommended tr."""
-    kept_share = offer.answer.kept
+    kept_share = offer.answer.mean_energy_bounds
     windows = offer.answer.windows
     return {
         "residual": format_if_known(best.residual, ".3f"),

@@ -415,11 +415,13 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     td = add_unit("td", history.time_unit)
     rigid.set(
-        ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None)
+        ylabel="saved processor time" if cost else "rigid time",
+        xlabel=td,
+        ylim=(0, None),
     )
     for axes in panels:
         for offer, colour, name in (
-            (trade_off.asked, FLIGHT, "td asked for"),
+            (trade_off.requested, FLIGHT, "td asked for"),
             (trade_off.recommended, SWITCHED, "recommended"),
         ):
             if offer:
@@ -442,7 +444,7 @@ def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) ->
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
     axes.plot(td, drawn, color=REFERENCE, linewidth=0.8, label="best pair for each td")
     axes.plot(
-        td[best], drawn[best], "o", color=GOOD, markersize=4, label="nothing beats it"
+        td[best], drawn[best], "o", color=GOOD, markersize=4, label="Pareto-optimal"
     )
 
 

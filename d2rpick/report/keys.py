@@ -233,10 +233,10 @@ QUALITY: Final = (
           lambda answer: answer.quality and answer.quality.worth and answer.quality.worth.share, later=True),
     Field("mean_energy_low", "size?", "lower bound of the mean energy after td, divided by the mean energy of the "
                                       "reference run",
-          lambda answer: answer.kept and answer.kept.low, later=True),
+          lambda answer: answer.mean_energy_bounds and answer.mean_energy_bounds.low, later=True),
     Field("mean_energy_high", "size?", "upper bound of the mean energy after td, divided by the mean energy of the "
                                        "reference run",
-          lambda answer: answer.kept and answer.kept.high, later=True),
+          lambda answer: answer.mean_energy_bounds and answer.mean_energy_bounds.high, later=True),
 )  # fmt: skip
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),

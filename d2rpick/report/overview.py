@@ -107,7 +107,7 @@ _PLAIN = (
 
 def as_table(overview: Overview, display: DisplayOptions) -> str:
     """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
-    lines = tables.format_in_line(list_verdict_lines(overview))
+    lines = tables.format_in_line(list_overview_lines(overview))
     if overview.health and (health := _list_health_rows(overview)):
         lines += [
             "",
@@ -127,7 +127,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
     )
 
 
-def list_verdict_lines(overview: Overview) -> list[tuple[str, str]]:
+def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
     lines = [("this run", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
@@ -145,7 +145,7 @@ def list_verdict_lines(overview: Overview) -> list[tuple[str, str]]:
 
 def as_markdown(overview: Overview, _: DisplayOptions) -> str:
     """Return the facts and the parts as Markdown tables, with the notes below."""
-    verdict_lines = tables.format_as_list(list_verdict_lines(overview))
+    verdict_lines = tables.format_as_list(list_overview_lines(overview))
     known_facts = [
         (name, value) for name, value in list_facts(overview) if value is not None
     ]

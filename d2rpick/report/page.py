@@ -430,7 +430,7 @@ def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
     return list_deck_digests(used.files, used.weights) if used else []
 
 
-def build_part_table(candidate: Candidate | None) -> Markup:
+def build_mismatch_table(candidate: Candidate | None) -> Markup:
     """Return a table of each part's contribution to the mismatch of a pair, nothing if the parts are unknown."""
     if candidate is None or not candidate.parts:
         return Markup()

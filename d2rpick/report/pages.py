@@ -123,7 +123,7 @@ def _build_lower_sections(
     answer: PairSuggestion, record: page.PageContext
 ) -> Iterator[Markup]:
     yield build_section("Candidates", *_build_candidates(answer))
-    yield page.build_part_table(answer.chosen)
+    yield page.build_mismatch_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
     if answer.recommended:
         yield page.build_solver_input(
@@ -208,7 +208,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
     yield build_section(
         "Measures", build_pairs((name, format_short(value)) for name, value in measures)
     )
-    yield page.build_part_table(candidate)
+    yield page.build_mismatch_table(candidate)
     if answer.switched:
         yield _build_comparison(
             answer.switched, record.switched.files if record.switched else ()
@@ -550,7 +550,7 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        overview.list_verdict_lines,
+        overview.list_overview_lines,
         lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
     ),
     "suggestion": (
@@ -589,7 +589,7 @@ def give_sentence(kind: str, answer: Any) -> str:
     return ": ".join(filter(None, _LOOKS[kind][0](answer)[0]))
 
 
-def describe_run(run: OpenedRun) -> str:
+def summarise_files(run: OpenedRun) -> str:
     """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)

@@ -128,7 +128,9 @@ def give_answer(trade_off: TradeOff) -> str:
     unit = trade_off.situation.history.time_unit
     if start is None:
         return "no td in the window has an acceptable tr"
-    start_text = f"td = {start.td:.6g}" + ("" if trade_off.asked else " saves the most")
+    start_text = f"td = {start.td:.6g}" + (
+        "" if trade_off.requested else " saves the most"
+    )
     if start.best is None:
         quality_text = f"{start_text} has no acceptable tr"
         return (
@@ -136,7 +138,7 @@ def give_answer(trade_off: TradeOff) -> str:
             if step is None
             else f"{quality_text}; {_describe_distance(start, step, unit)} has one"
         )
-    if not trade_off.asked:
+    if not trade_off.requested:
         quality_text = f"{start_text}, {_format_offer_error(start)}"
     else:
         quality_text = f"{start_text}: {_format_offer_error(start)}"
@@ -151,7 +153,7 @@ def give_answer(trade_off: TradeOff) -> str:
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", "number?", "given td", lambda trade_off: trade_off.asked and trade_off.asked.td),
+    Field("td", "number?", "given td", lambda trade_off: trade_off.requested and trade_off.requested.td),
     Field("td_window", "span",
           "range in which td was explored: the given range, or the longest flight up to the margin before the contact"),
     *keys.MECHANICS.of_part(lambda trade_off: trade_off.situation, ("flight", "oscillator", "modes")),
@@ -219,7 +221,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
     named_td = {
         offer.td
         for offer in (
-            trade_off.asked,
+            trade_off.requested,
             trade_off.recommended,
             trade_off.start,
             trade_off.step,

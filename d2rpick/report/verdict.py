@@ -46,7 +46,7 @@ SWITCHED: Final = row(
     Field("spread_after_reference", get_kind("number", minimum=0)),
     Field("momentum_error", "size?",
           "largest deviation of the momentum after td, relative to the largest momentum of the reference run after td"),
-    Field("displacement", "size?", "largest distance between the centers of the parts in the two runs after td"),
+    Field("displacement", "size?", "largest distance between the centres of the parts in the two runs after td"),
     Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", "texts"),
     Field("notes", "texts"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),

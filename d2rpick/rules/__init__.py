@@ -16,7 +16,7 @@ from d2rpick.base.settings import (
     RULE_KEYS,
     find_nearest_settings,
     format_toml_value,
-    refuse_unknown,
+    refuse_unknown_settings,
 )
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.radioss_files import HEAD, is_radioss
@@ -157,7 +157,7 @@ def read_configuration(
         for key, value in table.items()
         if key in RULE_KEYS or not isinstance(value, Mapping)
     ]
-    refuse_unknown(single, (*RULE_KEYS, *other_keys), source)
+    refuse_unknown_settings(single, (*RULE_KEYS, *other_keys), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
         problem = f"{source}: severity is {format_toml_value(severity)}"

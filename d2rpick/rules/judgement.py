@@ -85,7 +85,7 @@ class HistoryJudge:
     )
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
-    def beside(self, deck: str) -> None:
+    def use_deck(self, deck: str) -> None:
         """Use the supports, gravity and joints of this deck for the next judgements; a deck without parts defines
         none.
         """

@@ -134,10 +134,10 @@ def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
     (RADIOSS,),
 )
 def _check_order(case: RunCase) -> Iterator[Objection]:
-    """Each engine file continues the run from the end of the one before. The files are numbered from 1 without gaps,
-    their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick cannot determine
-    when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's help for /RUN, and
-    runs computed with OpenRadioss.
+    """Each engine file continues the run from the end of the previous engine file. The files are numbered from 1
+    without gaps, their /RUN lines have the same name, and no file ends before the previous file. Otherwise d2rpick
+    cannot determine when a part is rigid. Two engine files with the same end time are not reported. Source: Altair's
+    help for /RUN, and runs computed with OpenRadioss.
 
     Fix: Add the missing engine files, and correct their numbers, run names and end times.
     """

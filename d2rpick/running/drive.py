@@ -25,7 +25,7 @@ from d2rpick.running.sequence import (
     Order,
     choose_next_leg,
     collect_joined_legs,
-    find_window,
+    find_next_window,
     get_flight_findings,
 )
 from d2rpick.running.swing import find_swing
@@ -327,7 +327,7 @@ def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
     """Return a warning if parts swing too much in the window that the last leg ends; "" if not."""
     if legs[-1].findings.contact is None:
         return ""
-    window = find_window(legs, limits)
+    window = find_next_window(legs, limits)
     findings = get_flight_findings(legs)
     if window.reason or findings.steady_from <= window.td - window.free:
         return ""
@@ -413,13 +413,14 @@ class Observer:
         if self._given is not None and not idle:
             longer = shown_wait is not None and shown_wait.time > self._given
             why = f"as given, but {why}" if longer else "as given"
+        flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
-        swing = find_swing(history, free, tr)
+        swing = find_swing(history, free, tr) if flies else None
         return LegFindings(
             free=free,
             wait=wait,
             why=why,
-            flies=bool(flights) and flights[-1].end is None,
+            flies=flies,
             tr=tr,
             idle=idle,
             short=self._find_short_flights(order, wait),

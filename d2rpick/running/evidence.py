@@ -58,7 +58,7 @@ class GrowingEvidence:
         return [*self._of_parts, *self._of_model]
 
     def take(self, states: History) -> None:
-        """Append states; HistoryError if they have other quantities than the states so far."""
+        """Append states, which have the quantities of the states so far."""
         self._record.add(states)
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)
@@ -261,13 +261,6 @@ class GrowingEvidence:
             )
             for stretch in find_stretches(is_rigid, FEWEST)
         )
-
-
-def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
-    """Find all flights of a finished record, as `Evidence.flights`."""
-    evidence = GrowingEvidence()
-    evidence.take(history)
-    return evidence.flights(needed)
 
 
 def highest_energy(history: History, start: float, end: float) -> float:

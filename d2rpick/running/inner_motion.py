@@ -245,16 +245,6 @@ class InnerMotion:
         self._longest_of_parts: list[_Longest] = []
         self._longest_of_energy: list[_Longest] = []
 
-    @classmethod
-    def of(
-        cls, history: History, given: float | None = None, of_deck: Wait | None = None
-    ) -> InnerMotion:
-        """Return the inner motion of a finished record."""
-        evidence, motion = GrowingEvidence(), cls(given, of_deck)
-        evidence.take(history)
-        motion.take(history, evidence)
-        return motion
-
     def take(self, states: History, evidence: GrowingEvidence) -> None:
         """Append states, which the ``evidence`` has taken already."""
         self._evidence = evidence

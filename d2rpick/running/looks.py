@@ -5,16 +5,14 @@ Of the histories of solvers only the last states are read again.  Files of other
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, HistoryError
 from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.opening import Source, open_sources
-from d2rpick.histories.resuming import ResumePoint
 from d2rpick.histories.source import open_files, open_source
-from d2rpick.running.record import find_last_states, skip_states
+from d2rpick.running.record import find_last_states, hold_back_states, skip_states
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,23 +20,12 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
+    from d2rpick.histories.resuming import ResumePoint
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
 # A record with fewer states is read as a whole: what follows from all states, as which parts are springs, may change.
 _FEWEST_STATES: Final = 200
-
-
-class _ReadFile(NamedTuple):
-    """A file that was read: where the next look begins, and the number of the file in its file system."""
-
-    point: ResumePoint
-    inode: int
-
-    def shift(self, point: ResumePoint) -> ResumePoint:
-        """Return a point in the file, from its address behind the head of this one."""
-        skipped = self.point.begin - len(self.point.head)
-        return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
 
 
 class Looks:
@@ -49,14 +36,14 @@ class Looks:
     ) -> None:
         self._selection, self._inventory = selection, inventory
         self._last_states: list[Table] = []
-        # Files in which the next look reads on, and all files of the last look.
-        self._read_files: dict[str, _ReadFile] = {}
+        # Where the next look reads on, by file, and all files of the last look.
+        self._resume_points: dict[str, ResumePoint] = {}
         self._names: frozenset[str] = frozenset()
 
     @property
     def grow(self) -> bool:
         """Return True if the next look reads the last states only."""
-        return bool(self._read_files)
+        return bool(self._resume_points)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
         """Read the new states, and whether they follow the states that were read before.
@@ -71,7 +58,7 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            self._read_files, self._last_states = {}, []  # a file is gone
+            self._resume_points, self._last_states = {}, []  # a file is gone
         history = self._read_on(names)
         new_states = None
         if history is not None:
@@ -88,48 +75,36 @@ class Looks:
 
     def _read_whole(self, names: Sequence[str]) -> History:
         """Read all states of the files; errors as `new_states`."""
-        self._read_files = {}
         sources = open_files(names)
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)
-        if history.time.size >= _FEWEST_STATES and not is_packed:
-            self._note_read(points)
+        is_short = history.time.size < _FEWEST_STATES
+        self._resume_points = {} if is_packed or is_short else points
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
         """Read the last states of each file, those that were known among them, and the whole of new files.
 
-        Return None if a file was written anew, or if one of the files cannot be read from its middle.
+        Files without a point, as those with forces only, are not read again.  Return None if a file cannot be read from
+        its point, as when it was written anew.
         """
-        sources = self._list_last_pieces(names)
-        if not sources:
+        if not self._resume_points:
             return None
-        try:
-            history, points = self._open(sources)
-        except (FormatError, HistoryError):  # a file was written anew
-            return None
-        for name, read_file in self._read_files.items():
-            if name in points:
-                points[name] = read_file.shift(points[name])
-        self._note_read(points)
-        return history
-
-    def _list_last_pieces(self, names: Sequence[str]) -> list[Source]:
-        """Return the head and the last states of each file; [] if a file was written anew."""
-        if not self._read_files:
-            return []
         sources = []
         for name in names:
-            read_file = self._read_files.get(name)
-            if read_file is not None:
-                status = Path(name).stat()
-                is_same = status.st_ino == read_file.inode
-                if not is_same or status.st_size < read_file.point.begin:
-                    return []
-                sources.append(Source(name, read_file.point.read_on(name)))
+            if name in self._resume_points:
+                sources.append(Source(name, self._resume_points[name].read_on(name)))
             elif name not in self._names:
                 sources.append(open_source(name))
-        return sources
+        try:
+            history, points = self._open(sources)
+        except (FormatError, HistoryError):
+            return None
+        for name, point in self._resume_points.items():
+            if name in points:
+                points[name] = point.locate(points[name])
+        self._resume_points = points
+        return history
 
     def _open(
         self, sources: Sequence[Source]
@@ -145,14 +120,8 @@ class Looks:
             run = open_sources(whole_states, self._selection)
             points = _find_resume_points(run)
         run = add_surroundings(run, self._inventory)
-        return Reference.of(run, self._selection).history, points
-
-    def _note_read(self, points: Mapping[str, ResumePoint]) -> None:
-        """Note where the next look reads on; files without a point, as those with forces only, are not read again."""
-        self._read_files = {
-            name: _ReadFile(point, Path(name).stat().st_ino)
-            for name, point in points.items()
-        }
+        history = Reference.of(run, self._selection).history
+        return hold_back_states(history), points
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:

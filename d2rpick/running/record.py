@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.errors import HistoryError
-from d2rpick.histories.history import Given
+from d2rpick.histories.history import Given, History
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, History, Momenta
+    from d2rpick.histories.history import Balance, Momenta, Precision
 
     Table = History | Momenta | Balance
 
 # Rows for which a column has room from the start.
 _FEWEST_ROWS: Final = 64
+# States that are so many printed digits apart do not get the same time.
+_APART: Final = 1.5
 # Tolerance of values that are read twice, as a share of the largest one.  A sum over parts may end in other digits, and
 # the energy of springs is left out of an energy only if they have any in the states that are read together.
 _SAME: Final = 1e-9
@@ -59,7 +60,7 @@ class GrowingRecord:
         self._history: History | None = None
 
     def add(self, states: History) -> None:
-        """Append states; HistoryError if they have other quantities than the states so far."""
+        """Append states, which have the quantities of the states so far."""
         tables = list_tables(states)
         self._latest_tables = tables
         arrays = [_get_arrays(table) for table in tables]
@@ -67,12 +68,6 @@ class GrowingRecord:
             self._columns = [
                 {name: GrowingColumn() for name in table} for table in arrays
             ]
-        if [table.keys() for table in arrays] != [
-            table.keys() for table in self._columns
-        ]:
-            raise HistoryError(
-                "the states that were added hold other quantities than those before them"
-            )
         for columns, table in zip(self._columns, arrays, strict=True):
             for name, rows in table.items():
                 columns[name].add(rows)
@@ -115,15 +110,31 @@ def _join_tables(tables: Sequence[Any]) -> History:
     return joined
 
 
+def hold_back_states(history: History) -> History:
+    """Return a history without a last state that a later one may replace, since both are printed with the same time."""
+    first, *evidence = list_tables(history)
+    settled: list[Any] = [_drop_unsettled(first, history.time_precision)]
+    for table in evidence:
+        assert not isinstance(table, History)
+        settled.append(_drop_unsettled(table, table.precision))
+    return _join_tables(settled)
+
+
+def _drop_unsettled(table: Table, precision: Precision) -> Table:
+    """Return a table without its last state if the two last times are as near as they can be printed."""
+    quantum = precision.quantum(float(table.time[-1])) if table.time.size else 0.0
+    if table.time.size < 2 or table.time[-1] - table.time[-2] > _APART * quantum:
+        return table
+    return _select_rows(table, slice(-1))
+
+
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
     """Return the last state of each table of a history; where it has none, that of the tables ``before``."""
     tables = list_tables(history)
     last_states: list[Any] = []
     for number, table in enumerate(tables):
         if table.time.size:
-            arrays = _get_arrays(table)
-            rows: dict[str, Any] = {name: rows[-1:] for name, rows in arrays.items()}
-            last_states.append(replace(table, **rows))
+            last_states.append(_select_rows(table, slice(-1, None)))
         else:
             last_states.append(before[number] if before else table)
     return last_states
@@ -142,19 +153,19 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
         count = _count_known_states(table, last_state)
         if count is None:
             return None
-        arrays = _get_arrays(table)
-        new_rows: dict[str, Any] = {name: rows[count:] for name, rows in arrays.items()}
-        new_tables.append(replace(table, **new_rows))
+        new_tables.append(_select_rows(table, slice(count, None)))
     return _join_tables(new_tables)
 
 
 def _count_known_states(table: Table, last_state: Table) -> int | None:
     """Return the states of a table up to the last one that was known; None if that is not in it."""
+    arrays, last_values = _get_arrays(table), _get_arrays(last_state)
+    if arrays.keys() != last_values.keys():
+        return None
     if not last_state.time.size:
         return 0
     count = int(np.searchsorted(table.time, last_state.time[0], side="right"))
-    arrays, last_values = _get_arrays(table), _get_arrays(last_state)
-    if not count or arrays.keys() != last_values.keys():
+    if not count:
         return None
     for name, rows in arrays.items():
         largest = float(np.max(np.nan_to_num(np.abs(rows)), initial=0.0))
@@ -176,6 +187,14 @@ def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
         if (momenta.parts is not None) is of_parts:
             return momenta
     return None
+
+
+def _select_rows(table: Table, rows: slice) -> Table:
+    """Return a table with some of its rows."""
+    selected: dict[str, Any] = {
+        name: values[rows] for name, values in _get_arrays(table).items()
+    }
+    return replace(table, **selected)
 
 
 def _get_arrays(table: Table) -> dict[str, NDArray[Any]]:

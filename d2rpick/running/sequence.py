@@ -265,7 +265,7 @@ def _determine_probe_end(
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     """Order the leg that ends the window at its td; if the window does not pay, a deformable leg in its place."""
-    window, first = find_window(legs, limits), _get_first_rigid_leg(legs)
+    window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
     findings = get_flight_findings(legs)
     if window.reason:
         number, now = first.number, first.start
@@ -286,7 +286,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     return last.following(RIGID, window.td)
 
 
-def find_window(legs: Sequence[Leg], limits: Limits) -> Window:
+def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact that the last leg has shown; without a contact, up to the end of the run."""
     tr, findings, contact = (
         _get_first_rigid_leg(legs).start,
@@ -369,6 +369,6 @@ def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
             by_start[start] = Window(start, start, end, end, wait, reason)
         ends_flight = leg.findings.contact is not None or leg.order.until >= limits.end
         if leg.order.rigid and ends_flight:
-            window = find_window(legs[:count], limits)
+            window = find_next_window(legs[:count], limits)
             by_start[window.free] = window
     return [by_start[start] for start in sorted(by_start)]

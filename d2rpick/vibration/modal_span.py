@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 # Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
-# Windows around a flight that the energy alone shows begin and end at multiples of 1/32 of the record.
-_SMALL_PARTS: Final = 32
 # Shares of the record at which windows that reach its end begin.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window the record follows the modes while means over 1/8 of the fastest period deviate by less than this
@@ -83,10 +81,19 @@ def get_inner_window(history: History, guess: Span) -> Span:
 
 
 def get_outer_window(history: History, guess: Span) -> Span:
-    """Return the whole small parts of a record that contain a guessed window, so that guesses of many td share it."""
+    """Return the whole parts of a record that contain a guessed window, so that guesses of many td share few windows.
+
+    Examples
+    --------
+    >>> from d2rpick.histories.history import History
+    >>> time = np.linspace(0.0, 16.0, 33)
+    >>> history = History(time, time, source=("made",), format="csv", channel="E")
+    >>> get_outer_window(history, Span(2.3, 7.9)), get_outer_window(history, Span(0.0, 15.1))
+    (Span(start=2.0, end=8.0), Span(start=0.0, end=16.0))
+    """
     first = float(history.time[0])
     last = float(history.time[-1])
-    part = (last - first) / _SMALL_PARTS
+    part = (last - first) / _PARTS
     start = first + part * np.floor((guess.start - first) / part)
     end = first + part * np.ceil((guess.end - first) / part)
     return Span(max(float(start), first), min(float(end), last))

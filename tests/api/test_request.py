@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from d2rpick.api.choosing import Choosing, JudgingOptions
-from d2rpick.api.request import OPTIONS, OSCILLATOR, Request
+from d2rpick.api.request import CHOOSING_FOR_CARDS, OPTIONS, OSCILLATOR, Request
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice.options import CHOOSING_FOR_CARDS, ChoiceOptions
+from d2rpick.choice.options import ChoiceOptions
 from d2rpick.choice.parts.cost import Weights
 from d2rpick.choice.question import Settings
 from tests.generated_arguments import MODULE, write_module

@@ -115,7 +115,10 @@ def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_onc
     )
     situations = [look(td) for td in (10.0, *np.linspace(3900, 4000, 40))]
     assert (
-        max(judged.place.size for judged in judge_candidates(situations, most=4000))
+        max(
+            judged.situation_of.size
+            for judged in judge_candidates(situations, most=4000)
+        )
         < 40_000
     )
 

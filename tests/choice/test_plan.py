@@ -182,7 +182,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     ]
     assert not row_done.landed_rigid
     assert row_done.took_off == pytest.approx(take_off, abs=1e-3)
-    assert "rigid in the contact" in row_done.told
+    assert "rigid in the contact" in row_done.description
     assert "landed-rigid" in [caution.code for caution in planned.cautions]
     assert not planned.supported
     assert not planned.next_run
@@ -386,7 +386,10 @@ def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int) -> Non
     landings = {row.number: row.end for row in plan.flights}
     rows = [row for row in plan.flights if row.window]
     for row, explored in zip(rows, explore_flights(reference, plan), strict=True):
-        assert (require(explored.asked).tr, require(explored.asked).td) == row.window
+        assert (
+            require(explored.requested).tr,
+            require(explored.requested).td,
+        ) == row.window
         assert all(
             offer.tr is None or offer.tr >= landings.get(row.number - 1, 0.0)
             for offer in explored.offers

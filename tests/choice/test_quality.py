@@ -152,7 +152,7 @@ def test_candidates_are_kept_together_as_one_by_one(
     situation = examine_td(history, td, Settings(**limits))  # type: ignore[arg-type]
     ranked = next(rank_candidates([situation]))
     assert len(ranked) > 3
-    kept_flags = ranked.kept.tolist()
+    kept_flags = ranked.recommendable.tolist()
     assert kept_flags == [
         candidate.admissible and not list_exceeded_limits(situation, candidate)
         for candidate in ranked

@@ -174,12 +174,12 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     exploration = explore_run(
         make_reference(history), settings_asked, (td - 0.15, td + 0.15), td=td, steps=6
     )
-    assert require(exploration.asked).td == td
+    assert require(exploration.requested).td == td
     check(
         exploration,
         history,
         settings_asked,
-        [require(exploration.asked), *exploration.offers[::6]],
+        [require(exploration.requested), *exploration.offers[::6]],
     )
 
 

@@ -69,7 +69,7 @@ def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
     candidates = suggest_at(situation, with_better=False).candidates
     windows = find_acceptable_windows(situation, candidates, None)
     grid = np.linspace(0.1, float(windows[-1, 1]), 3000)
-    judged = judge_times(situation, grid.tolist()).kept
+    judged = judge_times(situation, grid.tolist()).recommendable
     levels = situation.vibration.whole.energies(grid)
     assert judged.any()
     assert levels[judged].max() <= find_largest_energy(situation)

@@ -13,7 +13,7 @@ from d2rpick.deck.printed_card import (
     LONGEST,
     PrintedCard,
     Printing,
-    check_windows,
+    refuse_overlapping_windows,
     write_number,
 )
 from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
@@ -148,7 +148,7 @@ def test_a_file_of_windows() -> None:
         (0.02, 0.09),
         (0.2, 0.3),
     )
-    assert check_windows([(-0.0, 1.0)])[0][0].hex() == "0x0.0p+0"
+    assert refuse_overlapping_windows([(-0.0, 1.0)])[0][0].hex() == "0x0.0p+0"
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:

@@ -20,7 +20,7 @@ from d2rpick.models.box_run import (
     BOX,
     Record,
     RigidWindow,
-    compare_runs,
+    compare_box_runs,
     continue_motion,
     find_comparison_end,
     run_to,
@@ -380,7 +380,7 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference, times, td = simulate_box(COARSE), [0.02, 0.15], 0.36
     alone = [
-        compare_runs(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
+        compare_box_runs(reference, simulate_box(COARSE, RigidWindow(tr, td)), tr, td)
         for tr in times
     ]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone

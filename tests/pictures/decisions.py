@@ -95,7 +95,7 @@ def sampling() -> Figure:
         draw_curve(axes, energy.index * 1e3, energy, MUTED, "energy")
         coarse = energy.iloc[::stride]
         axes.plot(
-            coarse.index * 1e3, coarse, ".-", color=REFERENCE, label="written states"
+            coarse.index * 1e3, coarse, ".-", color=REFERENCE, label="output states"
         )
         axes.set_title(text, fontsize=9)
         axes.set(ylim=(0, None), xlim=(0, 60))

@@ -31,7 +31,7 @@ from d2rpick.running.sequence import (
     Limits,
     Order,
     choose_next_leg,
-    find_window,
+    find_next_window,
     windows,
 )
 from tests.command import ROOT, put, read_refusal, run
@@ -395,10 +395,10 @@ def test_the_margin_is_the_least_one_where_nothing_vibrates(
 ) -> None:
     flown = Leg(Order(LOAD, 1, 0.0, 0.1), swing_seen, 1000)
     probe = Leg(Order(PROBE, 2, 0.1, 1.0), LegFindings(contact=0.4), 100)
-    assert find_window([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
-        0.4 - margin
-    )
-    assert find_window(
+    assert find_next_window(
+        [flown, probe], Limits(1.0, 1e-3, 0.002)
+    ).td == pytest.approx(0.4 - margin)
+    assert find_next_window(
         [flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)
     ).td == pytest.approx(0.35)
 

@@ -16,13 +16,17 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.evidence import GrowingEvidence, highest_energy, quiet_times
+from d2rpick.running.evidence import GrowingEvidence, highest_energy
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.witness import Quiet
 from tests.command import ROOT
 from tests.energies import require
 from tests.records import cut_history, make_table
-from tests.running.seen import take_whole_record
+from tests.running.seen import (
+    find_quiet_times,
+    follow_inner_motion,
+    take_whole_record,
+)
 
 # Windows of flights [s]: car with contacts at 2.3-11.8, 28.1-38.5 and 150.4 ms, box that lands at 285.8, 338.4 ms ...
 CAR, BOX = "carT01.gz", "drop2T01.gz"
@@ -61,7 +65,7 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    quiet_spans = quiet_times(history, InnerMotion.of(history).needed)
+    quiet_spans = find_quiet_times(history, follow_inner_motion(history).needed)
     assert list_spans(quiet_spans)[: len(expected)] == pytest.approx(
         np.array(expected), abs=5e-4
     )
@@ -77,8 +81,8 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
     for earlier_wait in (None, Wait(0.018, "record", "as in the flight before")):
         waits = [
             wait.wait
-            for wait in quiet_times(
-                record(BOX), InnerMotion.of(record(BOX), None, earlier_wait).needed
+            for wait in find_quiet_times(
+                record(BOX), follow_inner_motion(record(BOX), None, earlier_wait).needed
             )
         ]
         assert all(0.016 <= wait <= 0.021 for wait in waits[1:])
@@ -88,12 +92,12 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
 def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
     history = record(name)
     with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
-        quiet_times(history, InnerMotion.of(history, 0.002).needed)
+        find_quiet_times(history, follow_inner_motion(history, 0.002).needed)
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
     history = cut_history(record(CAR), 0.14)
-    last = quiet_times(history, InnerMotion.of(history, 0.022).needed)[-1]
+    last = find_quiet_times(history, follow_inner_motion(history, 0.022).needed)[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
     assert last.wait == 0.022
 
@@ -101,10 +105,10 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    quiet_spans = quiet_times(history, InnerMotion.of(history).needed)
+    quiet_spans = find_quiet_times(history, follow_inner_motion(history).needed)
     for time in history.time[[300, 640, 900]].tolist():
         early = cut_history(history, time)
-        early_spans = quiet_times(early, InnerMotion.of(early).needed)
+        early_spans = find_quiet_times(early, follow_inner_motion(early).needed)
         assert [span[:2] for span in early_spans] == [
             span[:2] for span in quiet_spans if span.seen <= time
         ]
@@ -120,7 +124,7 @@ def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    quiet_spans = quiet_times(switched, InnerMotion.of(switched).needed)
+    quiet_spans = find_quiet_times(switched, follow_inner_motion(switched).needed)
     assert list_spans(quiet_spans)[:2] == pytest.approx(
         np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3
     )
@@ -138,7 +142,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     listed = np.array(
         [flight.within(history.time) for flight in find_flights(history, Settings())]
     )
-    for flight in quiet_times(history, InnerMotion.of(history).needed):
+    for flight in find_quiet_times(history, follow_inner_motion(history).needed):
         flight_times = (
             flight.start,
             history.time[-1] if flight.end is None else flight.end,
@@ -154,13 +158,15 @@ def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
         Selection(parts=("box",))
     )
     (span,) = (
-        q for q in quiet_times(rising, InnerMotion.of(rising).needed) if q.start < 0.2
+        q
+        for q in find_quiet_times(rising, follow_inner_motion(rising).needed)
+        if q.start < 0.2
     )
     assert span.level is not None
     assert span.level - span.start == pytest.approx(0.31, rel=0.02)
     assert all(
         q.level is None
-        for q in quiet_times(record(BOX), InnerMotion.of(record(BOX)).needed)
+        for q in find_quiet_times(record(BOX), follow_inner_motion(record(BOX)).needed)
         if q.start < 0.6
     )
 
@@ -208,7 +214,7 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(
 ) -> None:
     """Its first states are within the remaining force, later ones are not: the flight begins later, and continues."""
     history = make_pushed_body(round(tail, 4), round(share, 4))
-    (flight,) = quiet_times(history, lambda *_: wait)
+    (flight,) = find_quiet_times(history, lambda *_: wait)
     assert 0.02 <= flight.start <= 0.05
     assert flight.seen <= 0.05 + wait
     assert flight.end == pytest.approx(0.17, abs=8e-4)
@@ -256,7 +262,7 @@ def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> No
     time = np.arange(0.0, 0.1, 5e-5)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.02)
     energy[0] = 0.0 if jump else energy[0]
-    longest_period = require(InnerMotion.of(make_table(time, energy)).longest(0.1))
+    longest_period = require(follow_inner_motion(make_table(time, energy)).longest(0.1))
     assert longest_period.time == pytest.approx(0.02, rel=0.1)
 
 

@@ -2,12 +2,14 @@
 
 import math
 import re
+import stat
 from pathlib import Path
 
 import pytest
 
 import d2rpick as d2
 from d2rpick.deck.radioss_run import read_run
+from tests.command import ROOT
 from tests.decks import pad, write
 from tests.sprung import write_cubes
 
@@ -253,3 +255,15 @@ def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(
     notes = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02).notes
     assert any("give the time of the last push" in note for note in notes) is thrown
     assert any("At rest in free fall" in note for note in notes) is not thrown
+
+
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path) -> None:
+    plate = str(ROOT / "sample_data/falling_plate/plate_0000.rad")
+    written = d2.first(plate, tmp_path / "next", parts=1, wait=0.02)
+    for file in (tmp_path / "next").iterdir():
+        file.chmod(0o600)
+    again = d2.first(plate, tmp_path / "next", parts=1, wait=0.02, overwrite=True)
+    assert again.files == written.files
+    assert {
+        stat.S_IMODE(file.stat().st_mode) for file in (tmp_path / "next").iterdir()
+    } == {0o600}

@@ -191,6 +191,31 @@ def test_a_state_that_is_being_written_is_left_out_wherever_the_file_ends(
     assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
 
 
+@pytest.mark.parametrize("form", ["glstat", "matsum"])
+def test_states_at_the_same_printed_time_do_not_make_a_look_begin_again(
+    tmp_path: Path, form: str
+) -> None:
+    """The newest of them counts, so the last one is not given before a later time is written."""
+    run = cut_run(make_falling_masses(), 240)
+    step = 4e-6 if form == "glstat" else 4e-5  # 2/5 of the last printed digit
+    time = np.asarray(1 + step * np.arange(240), np.float64)
+    path = Path(FORMS[form](run._replace(time=time), tmp_path))
+    data, looks = path.read_bytes(), Looks(Selection())
+    whole = open_run([str(path)]).history(Selection())
+    pieces = list[History]()
+    for end in range(9 * len(data) // 10, len(data) + 1, len(data) // 397):
+        path.write_bytes(data[:end])
+        states, follows = looks.new_states([str(path)])
+        assert follows is bool(pieces)
+        pieces.append(states)
+    assert sum(piece.time.size > 0 for piece in pieces) > 5
+    times = np.concatenate([piece.time for piece in pieces])
+    assert np.array_equal(times, whole.time[: times.size])
+    assert times.size >= whole.time.size - 2
+    energies = np.concatenate([piece.energy for piece in pieces])
+    assert np.array_equal(energies, whole.energy[: times.size])
+
+
 def test_a_run_is_watched_from_a_look_at_a_state_that_is_half_written(
     tmp_path: Path,
 ) -> None:

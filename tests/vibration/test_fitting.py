@@ -120,3 +120,18 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
         assert (
             sum(decays_tried) > 10 * S.size / 8 and max(decays_tried) > 2048
         ) == all_of_them
+
+
+def test_a_drift_is_fitted_to_some_of_the_samples_only() -> None:
+    sizes = []
+
+    def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        sizes.append(s.size)
+        return compute_energy_and_jacobian(parameters, s, WITH_PRELOAD)
+
+    rate = np.array([0.2, 0.5, 0.7, 0.7, 0.0, 1.0])
+    rising = S + 0.05 * np.sin(60 * S) ** 2
+    drift = fit_all(rate, model, S, rising, np.inf)
+    assert drift is not None
+    assert abs(drift[0]) < 2 * np.pi / 10
+    assert max(sizes) <= 2048

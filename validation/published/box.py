@@ -14,7 +14,7 @@ from d2rpick.choice.runs.study import choose_common_tr, make_row
 from d2rpick.models.box_run import (
     BOX,
     RigidWindow,
-    compare_runs,
+    compare_box_runs,
     make_history,
     simulate,
 )
@@ -271,7 +271,7 @@ def _switch_variant(
     variant: Variant, row: StudyRow, error: float, common: RigidWindow
 ) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
-    outcome = compare_runs(reference, run, common.tr, common.td)
+    outcome = compare_box_runs(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
     return Tried(variant, row, error, outcome.roll_error, end)
 

@@ -38,17 +38,19 @@ _OF_SOLVER: Final = 0.005
 _FEWEST_STATES: Final = 8
 
 
-class Kept(NamedTuple):
+class MeanEnergyBounds(NamedTuple):
     """Lowest and highest mean internal energy after td, over that of the reference run [-]."""
 
     low: float
     high: float
 
 
-def bound_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
+def bound_mean_energy(
+    situation: Situation, candidate: Candidate
+) -> MeanEnergyBounds | None:
     """Return bounds of the mean energy after td for one tr; None if they are unknown."""
     if situation.at_rest:
-        return Kept(1.0, 1.0)
+        return MeanEnergyBounds(1.0, 1.0)
     ratios = [
         _compute_mean_ratio(candidate.energy, situation.energy_td, *energies)
         for energies in _bound_vibration_energies(situation)
@@ -62,8 +64,8 @@ def bound_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
     # parts that were not chosen may pass on their energy
-    other_energy = situation.together.beside.energy
-    return Kept(
+    other_energy = situation.together.not_chosen.energy
+    return MeanEnergyBounds(
         max(low, 0.0),
         high + (other_energy / situation.energy_td if situation.energy_td > 0 else 0.0),
     )

@@ -111,13 +111,13 @@ class Pair(NamedTuple):
 class Judged:
     """Times that may serve as tr for one or many td of a record, judged by flight, sign and tolerance.
 
-    All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``place`` is the index
-    into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``, ``level_error``,
-    ``same_swing``, ``position_error`` and ``rigid_time``, NaN for unknown values.
+    All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``situation_of`` is the
+    index into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``,
+    ``level_error``, ``same_swing``, ``position_error`` and ``rigid_time``, NaN for unknown values.
     """
 
     situations: Sequence[Situation]
-    place: NDArray[np.int32]
+    situation_of: NDArray[np.int32]
     moments: Moments
     columns: Columns
     objections: tuple[Objection, ...]
@@ -176,14 +176,16 @@ class Judged:
     def ends(self) -> list[int]:
         """Index of the first candidate of each situation, and the number of all candidates."""
         ends: list[int] = np.searchsorted(
-            self.place, np.arange(len(self.situations) + 1)
+            self.situation_of, np.arange(len(self.situations) + 1)
         ).tolist()
         return ends
 
     @property
     def td(self) -> Samples:
         """The td of each candidate, shape (n,) [time]."""
-        return np.array([situation.td for situation in self.situations])[self.place]
+        return np.array([situation.td for situation in self.situations])[
+            self.situation_of
+        ]
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
@@ -193,14 +195,14 @@ class Judged:
         )
 
     @property
-    def kept(self) -> NDArray[np.bool_]:
+    def recommendable(self) -> NDArray[np.bool_]:
         """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
         return self.acceptable & self.within_limits
 
     @property
     def within_limits(self) -> NDArray[np.bool_]:
         """True for each candidate that exceeds no limit of the settings, shape (n,)."""
-        keeps = np.ones(self.place.size, np.bool_)
+        keeps = np.ones(self.situation_of.size, np.bool_)
         for limit, value in self.situations[0].settings.limits:
             keeps &= limit.is_kept_by(self.get_quantity(limit.quantity), value)
         return keeps
@@ -210,7 +212,7 @@ class Judged:
         if name in self.columns:
             return self.columns[name]
         values = [getattr(situation, name) for situation in self.situations]
-        return np.array(values, np.float64)[self.place]
+        return np.array(values, np.float64)[self.situation_of]
 
     @property
     def error(self) -> Samples:
@@ -229,14 +231,14 @@ class Judged:
     def modal(self) -> NDArray[np.bool_]:
         """True for each candidate that is judged by many modes, shape (n,)."""
         return np.array([situation.basis == "modal" for situation in self.situations])[
-            self.place
+            self.situation_of
         ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
         """True for each candidate of many modes in the last part of the flight before td, which saves little."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
-        flown = self.td - np.array(starts)[self.place]
+        flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
@@ -246,13 +248,15 @@ class Judged:
             np.inf if situation.bodies is None else situation.bodies.limit
             for situation in self.situations
         ]
-        return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
+        return np.asarray(
+            self.columns["position_error"] > np.array(limits)[self.situation_of]
+        )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
         """Select the rows of candidates without objections, ascending."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
-            self.situations, self.place[rows], self.moments.at(rows), columns, ()
+            self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
         )
 
 
@@ -276,9 +280,9 @@ class Candidates(Sequence[Candidate]):
         return self.judged.moments.tr[self.order]
 
     @property
-    def kept(self) -> NDArray[np.bool_]:
+    def recommendable(self) -> NDArray[np.bool_]:
         """True for each candidate, in order, that is acceptable and within the limits of the settings."""
-        return self.judged.kept[self.order]
+        return self.judged.recommendable[self.order]
 
     @cached_property
     def chosen(self) -> Candidate | None:
@@ -354,7 +358,7 @@ class Candidates(Sequence[Candidate]):
         notes = list[str]()
         for objection in judged.objections:
             if objection.holds[i]:
-                notes += objection.told(i)
+                notes += objection.describe(i)
         admissible = not notes
         residual = values["residual"]
         is_kept = residual is None or residual <= POOR_RESIDUAL
@@ -425,7 +429,7 @@ def judge_candidates(
 def judge_times(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and judge it by flight, sign and tolerance."""
     judged = Judged.of([situation], [Moments.of("given", [*times])])
-    return Candidates(situation, judged, np.arange(judged.place.size))
+    return Candidates(situation, judged, np.arange(judged.situation_of.size))
 
 
 def _find_start_at_rest(situation: Situation) -> Moments | None:

@@ -16,7 +16,7 @@ from d2rpick.vibration.measures import wrong_sign
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.pair.situation import Situation
@@ -45,7 +45,7 @@ class Decision(NamedTuple):
         Reasons why the pair is not admissible; empty if it is.
     at_rest : bool
         True if nothing vibrates in the flight up to td.
-    kept : Kept or None
+    mean_energy_bounds : MeanEnergyBounds or None
         Bounds of the mean energy after td over that of the reference run [-]; None if they are unknown.
     residual : float or None
         Expected residual [-].
@@ -61,7 +61,7 @@ class Decision(NamedTuple):
     quality: Quality
     objections: tuple[str, ...]
     at_rest: bool
-    kept: Kept | None
+    mean_energy_bounds: MeanEnergyBounds | None
     residual: float | None
     worst_residual: float
     better: Pair | None = None
@@ -95,9 +95,9 @@ class Decision(NamedTuple):
                 "the same as in the reference: nothing vibrates in the flight up to td"
             )
         parts = []
-        if self.kept is not None:
+        if self.mean_energy_bounds is not None:
             parts.append(
-                f"{format_bounds(self.kept)} of the reference's mean energy after td"
+                f"{format_bounds(self.mean_energy_bounds)} of the reference's mean energy after td"
             )
         if self.residual is not None:
             parts.append(f"vibration wrong by {self.residual:.1%}")
@@ -146,7 +146,7 @@ def decide(
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,
-        kept=bound_mean_energy(situation, candidate),
+        mean_energy_bounds=bound_mean_energy(situation, candidate),
         residual=candidate.residual,
         worst_residual=_find_worst_residual(situation, candidate),
         better=better,
@@ -178,9 +178,9 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
     )
 
 
-def format_bounds(kept: Kept) -> str:
+def format_bounds(bounds: MeanEnergyBounds) -> str:
     """Write the bounds of the mean energy, as one number if both look alike."""
-    low, high = f"{kept.low:.0%}", f"{kept.high:.0%}"
+    low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 

@@ -72,7 +72,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     are of like quality too, except among rigid times within 10 % of the longest.  The rest follows by error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
-    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
+    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
     situations = judged.situations
     room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
     alike = np.repeat([_get_limit_of_alike(each) for each in situations], 3)
@@ -84,7 +84,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
         room,
         alike,
     )
-    is_kept = judged.kept[rows]
+    is_kept = judged.recommendable[rows]
     for situation, (first, last) in zip(
         judged.situations, pairwise(judged.ends), strict=True
     ):
@@ -322,7 +322,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
         return "name the parts to be switched with `parts`, if the files have parts"
-    other_parts = situation.together.beside.parts
+    other_parts = situation.together.not_chosen.parts
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         return f"name all parts that vibrate together with `parts`: {names} as well"

@@ -342,6 +342,8 @@ def _find_other_models(
         # imported here: better evidence does not need it
         from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
 
+        # the energy alone shows a slightly different flight to each td; signs of parts are followed in few windows,
+        # since times at which a load still acts are told from the vibration
         around = get_outer_window(history, around)
     models = find_part_signs(history, around)
     is_sign_known = any(model.signed for model in models.values())

@@ -19,7 +19,7 @@ class PartsTogether:
         self._history, self._flight = history, flight
 
     @cached_property
-    def beside(self) -> Beside:
+    def not_chosen(self) -> Beside:
         """Parts that vibrate with the chosen ones but were not chosen."""
         # imported here: an oscillator does not need it
         from d2rpick.flight.vibrating import (
@@ -31,7 +31,7 @@ class PartsTogether:
     @property
     def complete(self) -> bool:
         """True if all parts that vibrate together were chosen."""
-        return not self.beside.parts
+        return not self.not_chosen.parts
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:

@@ -340,23 +340,23 @@ class Expectation(NamedTuple):
 class Means(NamedTuple):
     """Energies that decide the mean energy after td [energy].
 
-    ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``after`` is the mean of the
+    ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``mean_after`` is the mean of the
     reference run after td.
     """
 
     mean: float
     lowest: float
     resting: float
-    after: float
+    mean_after: float
 
     def ratio(self, locked: float) -> float:
         """Return the mean energy after td over that of the reference run [-] if ``locked`` is locked in [energy]."""
-        return (self.resting + (locked - self.resting) / 2) / self.after
+        return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
-    def most(self) -> float:
+    def largest_locked_in(self) -> float:
         """Largest energy that may be locked in, so that the energy after td does not exceed the reference [energy]."""
-        return self.resting + 2 * (MOST_KEPT * self.after - self.resting)
+        return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
 def compute_means(situation: Situation) -> Means | None:
@@ -382,7 +382,7 @@ def compute_means(situation: Situation) -> Means | None:
 def find_largest_energy(situation: Situation) -> float:
     """Return the largest energy that may be locked in at a td [energy]; infinite if the energy does not limit it."""
     means = compute_means(situation)
-    return means.most if means else np.inf
+    return means.largest_locked_in if means else np.inf
 
 
 def estimate_time_after(
@@ -439,12 +439,12 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 class Objection(NamedTuple):
     """An objection to the candidates for which ``holds`` is True, shape (n,).
 
-    ``told`` returns its text for a candidate by index.  Since answers are pickled with it, ``told`` is a function of
+    ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.
     """
 
     holds: NDArray[np.bool_]
-    told: Callable[[int], Iterable[str]]
+    describe: Callable[[int], Iterable[str]]
 
 
 def list_objections(
@@ -514,7 +514,10 @@ def list_objections(
         is_above = (
             energy
             > np.array(
-                [situation.most if situation else np.inf for situation in means]
+                [
+                    situation.largest_locked_in if situation else np.inf
+                    for situation in means
+                ]
             )[situation_of]
         )
         yield Objection(

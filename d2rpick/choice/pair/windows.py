@@ -61,7 +61,7 @@ def find_acceptable_windows(
         situation,
         np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
     )
-    acceptable = widest[judged.kept.reshape(-1, 3).all(axis=1)]
+    acceptable = widest[judged.recommendable.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:
         return acceptable
     if (

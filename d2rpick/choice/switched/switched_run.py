@@ -94,7 +94,7 @@ class DoneWindow(NamedTuple):
         return self.landing - self.planned
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Sentence for the user on what became of the window."""
         if self.flight is None:
             return "no flight is seen there"

@@ -250,7 +250,7 @@ def _list_rows(
         done_in_flight = [done for done in done_rows if done.flight == found_flight]
         if done_in_flight:
             for done in done_in_flight:
-                yield row._replace(status="done", reason=done.told, done=done)
+                yield row._replace(status="done", reason=done.description, done=done)
         elif last is not None and start < last:
             yield row._replace(reason="before the last window that is done")
         elif settings.after is not None and end <= settings.after:
@@ -408,7 +408,7 @@ def _warn_about_windows(
 ) -> Iterator[Caution]:
     """Yield the warnings about all windows, each once."""
     for done in done_rows:
-        window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.told}"
+        window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.description}"
         if done.rigid_in_contact:
             yield Caution("landed-rigid", window)
         elif done.flight is None:

@@ -35,7 +35,7 @@ from d2rpick.histories.digits import round_as_read
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
-    from d2rpick.choice.pair.aftermath import Kept
+    from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Candidates, Pair
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Quality
@@ -135,9 +135,9 @@ class Offer(AnswerAtTd):
         return self.answer.quality
 
     @property
-    def kept(self) -> Kept | None:
+    def mean_energy_bounds(self) -> MeanEnergyBounds | None:
         """Bounds of the mean energy after td, over that of the reference run."""
-        return self.answer.kept
+        return self.answer.mean_energy_bounds
 
 
 def make_offers(
@@ -167,10 +167,10 @@ def make_offers(
 class TradeOff:
     """Answer of ``explore``: the offers by ascending td in ``td_window`` [time], which keeps the margin.
 
-    ``asked`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the window;
-    ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the requested
-    td, else the one that saves most.  ``step`` is the nearest unbeaten offer with half the error of ``start``, else the
-    recommended one if its error is smaller.
+    ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
+    window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
+    requested td, else the one that saves most.  ``step`` is the nearest unbeaten offer with half the error of
+    ``start``, else the recommended one if its error is smaller.
     """
 
     situation: Situation
@@ -178,7 +178,7 @@ class TradeOff:
     td_window: tuple[float, float]
     offers: tuple[Offer, ...]
     cautions: tuple[Caution, ...]
-    asked: Offer | None = None
+    requested: Offer | None = None
     recommended: Offer | None = None
     start: Offer | None = None
     step: Offer | None = None
@@ -254,7 +254,7 @@ def explore_run(
         td_window=inside,
         offers=tuple(offers),
         cautions=tuple(_warn_about_window(warned, window, inside, offers, suggestion)),
-        asked=requested,
+        requested=requested,
         recommended=next((offer for offer in offers if offer.recommended), None),
         start=start,
         step=_find_step(start, offers) if start else None,

@@ -285,14 +285,14 @@ def _make_scales(decimals: int) -> tuple[Samples, Samples]:
     )
 
 
-def parse_number(text: bytes) -> float:
+def parse_fortran_number(text: bytes) -> float:
     """Return the value of a right-justified Fortran field, NaN if it is not a finite number.
 
     Examples
     --------
-    >>> [parse_number(text) for text in (b"   4.87301E-03", b"   1.23457-100", b"   1.00000D+00", b"     1447")]
+    >>> [parse_fortran_number(text) for text in (b"   4.87301E-03", b"   1.23457-100", b"   1.00000D+00", b"     1447")]
     [0.00487301, 1.23457e-100, 1.0, 1447.0]
-    >>> [parse_number(text) for text in (b"**************", b"      NaN", b"  1.0E+00 ", b"   1.0E+999")]
+    >>> [parse_fortran_number(text) for text in (b"**************", b"      NaN", b"  1.0E+00 ", b"   1.0E+999")]
     [nan, nan, nan, nan]
     """
     match = _NUMBER.fullmatch(text)
@@ -303,7 +303,7 @@ def parse_number(text: bytes) -> float:
     return value if np.isfinite(value) else np.nan
 
 
-def parse_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
+def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     """Return the values of fixed-width fields, exactly those of ``float()``; NaN for a field that is not a number.
 
     Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
@@ -322,7 +322,7 @@ def parse_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
 
     Examples
     --------
-    >>> parse_numbers(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
+    >>> parse_fortran_numbers(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
     [0.00487301, -805.0, 2e-20]
     """
     if not fields.size:
@@ -361,5 +361,5 @@ def parse_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     far = usual & np.isnan(values)
     values[far] = [float(text) for text in fields[far].tolist()]
     for row in np.flatnonzero(~usual):
-        values[row] = parse_number(fields[row : row + 1].tobytes())
+        values[row] = parse_fortran_number(fields[row : row + 1].tobytes())
     return values

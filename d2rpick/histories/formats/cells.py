@@ -108,7 +108,7 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
     return float(number.replace(",", ".").replace("D", "E").replace("d", "e"))
 
 
-def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
+def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
     """Return True if a cell holds a number, which is not computed: cells are asked by the thousand."""
     return _written_number(cell, decimal, thousands) is not None
 

@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import is_number, is_skipped, split_cells
+from d2rpick.histories.formats.cells import has_number, is_skipped, split_cells
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import (
     Layout,
@@ -88,7 +88,7 @@ def find_numeric_columns(
     return frozenset(
         column
         for column in columns
-        if any(is_number(row[column], ".") for row in sample)
+        if any(has_number(row[column], ".") for row in sample)
     )
 
 
@@ -359,7 +359,7 @@ class Table(Database):
     @cached_property
     def _printed(self) -> list[list[str]]:
         """The sampled rows within the table: neither after the end of a curve nor words below the table."""
-        return [row for row in self._sample if is_number(row[self._time], ".")]
+        return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Return the columns that must be whole in a last line without end: the requested ones, or the default ones."""

@@ -24,7 +24,7 @@ from d2rpick.histories.formats.blocks import (
     Grammar,
     Stretch,
     count_like_example,
-    parse_numbers,
+    parse_fortran_numbers,
     read_head_of_listing,
 )
 from d2rpick.histories.resuming import ResumePoint
@@ -180,22 +180,25 @@ class Blocks(Database):
         )
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read can begin: at the block before the last one.
+        """Return where a later read can begin: at the newest state of the last but two printed times.
 
-        The lines of that block tell when the last one is whole.  A last state of which only the needed lines are there,
-        as `admit_rest` takes it, is not whole.
+        The states after it tell whether the last one is whole, and which of those with the same printed time is the
+        newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not whole.
         """
-        begin, last_used = self.tail, self.tail
-        for run in self:
-            last_used = run.start + (run.repeats - 1) * run.stride
-            if last_used < self.tail:
-                begin = last_used
-            elif run.repeats > 1:
-                begin = last_used - run.stride
-        first = self._find(self._begin)
+        times = self.numbers([self._grammar.time])[:, 0]
+        state = times.size - 1
+        for _ in range(2):
+            earlier = np.flatnonzero(times[: state + 1] < times[state])
+            state = int(earlier[-1]) if earlier.size else 0
+        first, begin, end = self._find(self._begin), self.tail, len(self._data)
+        if times.size:
+            run, number = self._run_of(state)
+            begin = run.start + number * run.stride
+            last_run, number = self._run_of(times.size - 1)
+            last_used = last_run.start + number * last_run.stride
+            if self.rest is not None and last_used == self.rest.start:
+                end = last_used
         head = self._data[: self.tail if first is None else first]
-        is_half = self.rest is not None and last_used == self.rest.start
-        end = self.tail if is_half else len(self._data)
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
@@ -221,13 +224,13 @@ class Blocks(Database):
                 numbers = self._decoded(addresses)
             else:
                 fields = taken[begin:end, moving].ravel()
-                numbers = parse_numbers(fields, self._grammar.decimals)
+                numbers = parse_fortran_numbers(fields, self._grammar.decimals)
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
         """Return the numbers at these addresses, NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
-        return parse_numbers(
+        return parse_fortran_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
         )
 

@@ -12,8 +12,8 @@ from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.cells import (
     find_thousands,
+    has_number,
     is_missing,
-    is_number,
     is_skipped,
     is_word,
     parse_cell,
@@ -147,7 +147,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
         cell
         for row in rows
         for cell in row
-        if not is_number(cell, table.decimal, table.thousands) and not is_missing(cell)
+        if not has_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     if odd:
         return table._replace(thousands=find_thousands(odd, table.decimal))

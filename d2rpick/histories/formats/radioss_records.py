@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import DIGITS
-from d2rpick.histories.formats.blocks import parse_numbers
+from d2rpick.histories.formats.blocks import parse_fortran_numbers
 
 if TYPE_CHECKING:
     from d2rpick.histories.content import Bytes, Content
@@ -180,7 +180,7 @@ class _TextRecords(Records):
         return _MARK + number + b"R" + self._line_end
 
     def values(self, fields: Bytes) -> Samples:
-        values = parse_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
+        values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
         # a shifted or blanked number is often another one
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values

@@ -205,8 +205,8 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of the file can begin: at its last whole state."""
-        begin = self._records.at + self._stride * max(self._states - 1, 0)
+        """Return where a later read of the file can begin: at its last but one whole state."""
+        begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
 

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content
-from d2rpick.histories.formats.blocks import parse_numbers
+from d2rpick.histories.formats.blocks import parse_fortran_numbers
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import (
@@ -177,7 +177,7 @@ def test_numbers_are_those_of_float_bit_for_bit(
     texts = [f"{value:.{decimals}E}" for value in values]
     fields = np.array([text.rjust(decimals + 10).encode() for text in texts])
     assert (
-        parse_numbers(fields, decimals).tobytes()
+        parse_fortran_numbers(fields, decimals).tobytes()
         == np.array([float(text) for text in texts]).tobytes()
     )
 
@@ -190,7 +190,7 @@ def test_numbers_are_those_of_float_bit_for_bit(
     )
 )
 def test_odd_fields_are_float_or_nan(texts: list[str]) -> None:
-    numbers = parse_numbers(np.array([text.encode() for text in texts]), 5)
+    numbers = parse_fortran_numbers(np.array([text.encode() for text in texts]), 5)
     for text, value in zip(texts, numbers.tolist(), strict=True):
         plain = text.lower().replace("d", "e")
         try:
