@@ -29,7 +29,7 @@ def main() -> None:
     try:
         if (
             signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        ):  # a job in the background ignores it
+        ):  # background jobs ignore interrupts
             signal.signal(signal.SIGINT, interrupt)
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(100_000)

@@ -14,7 +14,7 @@ from d2rpick.choice.options import ChoiceOptions, list_uses
 from tests.command import ROOT
 
 MODULE = ROOT / "d2rpick" / "api" / "choosing.py"
-HEAD = '''"""Keyword arguments that say how to choose and judge.
+HEAD = '''"""Define the keyword arguments for choosing and judging.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """

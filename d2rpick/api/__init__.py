@@ -1,4 +1,4 @@
-"""Offer the questions and answers of d2rpick: what ``import d2rpick`` exports and the command line calls.
+"""Offer the questions and answers of d2rpick: the names that ``import d2rpick`` exports and the commands call.
 
 A name is imported when it is first used.  Type checkers and editors find the names in the stub
 ``d2rpick/__init__.pyi``.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer:
-    """What all answers have in common; an answer is immutable.
+    """Base class of all answers; an answer is immutable.
 
     Two answers are equal if their content is equal, such as an answer and its copy from another process.
 
@@ -36,7 +36,7 @@ class Answer:
     come from no file are written as ``<weights in memory>``.
     """
 
-    if TYPE_CHECKING:  # a field of some answers, computed from others
+    if TYPE_CHECKING:  # a field of some answers, a property of others
 
         @property
         def command(self) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ class Answer:
 
     cautions: tuple[Caution, ...]
     kind: ClassVar[str]  # name in the table of forms
-    said: ClassVar[tuple[str, ...]] = ()  # attributes that a short form shows
+    said: ClassVar[tuple[str, ...]] = ()  # attributes shown by a short form
 
     @classmethod
     def of(cls, result: Any, **further_fields: Any) -> Self:
@@ -138,7 +138,7 @@ class RunAnswer(Paged):
 
     question: RunQuestion = field(repr=False)
     times: tuple[str, ...]
-    name: ClassVar[str]  # name of the command
+    name: ClassVar[str]  # name of the command that asks the question
 
     @property
     def run(self) -> Run:
@@ -171,7 +171,7 @@ class RunAnswer(Paged):
         chosen: tuple[Situation, float] | None,
         explored: TradeOff | None,
     ) -> PageContext:
-        """Return what a page shows besides the answer, with the card of the chosen situation and tr."""
+        """Return the content of a page besides the answer, with the card of the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
         context = PageContext(
@@ -204,7 +204,7 @@ class RunAnswer(Paged):
         return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
-        """Return what can be explored on a page, and the command line that asks for each td."""
+        """Return the interactive data of a page, and the command line that asks for each td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
@@ -217,7 +217,7 @@ class RunAnswer(Paged):
 
 def write_page(path: arguments.Path, page: str) -> Path:
     """Write a page and return its path."""
-    from pathlib import Path  # imported here since a table does not need it
+    from pathlib import Path  # imported here: tables do not need it
 
     from d2rpick.api import arguments
 

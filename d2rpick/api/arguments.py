@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     Path = str | os.PathLike[str]
     Deck = (
         Path | Literal[False]
-    )  # False means no deck, even if one lies in the folder of the run
+    )  # False means no deck, even if one is in the folder of the run
     Parts = str | int | Iterable[str | int]
 
-_LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut off in a message
+_LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut in a message
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -292,7 +292,7 @@ def check_run(name: str, run: object) -> None:
 
     if not (
         hasattr(run, "files") and hasattr(run, "overview")
-    ):  # imported here since its class imports this module
+    ):  # imported here: its class imports this module
         if isinstance(run, str | os.PathLike):
             description = repr(run)
         else:
@@ -352,7 +352,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
 
 
 def read_choosing(choosing: Choosing) -> dict[str, Any]:
-    """Return the fields of a request that contain how to choose."""
+    """Return the fields of a request that define how to choose."""
     from d2rpick.api.choosing import Choosing as Arguments
 
     expected_names = Arguments.__annotations__
@@ -362,9 +362,7 @@ def read_choosing(choosing: Choosing) -> dict[str, Any]:
         refuse_unknown(unknown[0], expected_names, other_names)
     oscillator = _check_oscillator(arguments.pop("oscillator", None))
     if (oscillator is None) != (arguments.get("v0") is None):
-        raise ValueError(
-            "oscillator and v0 go together: the one vibrates because of the other"
-        )
+        raise ValueError("give oscillator and v0 together")
     replay = check_flag("replay", arguments.pop("replay", None), True)
     checked = {
         name: check_option(name, value, OPTIONS[name], getattr(Request, name))
@@ -392,7 +390,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
         return None
     from d2rpick.vibration.oscillator import (
         Oscillator,
-    )  # imported here since an oscillator is rarely given
+    )  # imported here: an oscillator is rarely given
 
     if not isinstance(value, Oscillator):
         raise TypeError(
@@ -409,7 +407,7 @@ def check_weights(value: object) -> Any:
         return check_path("weights", value)
     from d2rpick.choice.parts.cost import (
         Weights,
-    )  # imported here since weights are rarely given
+    )  # imported here: weights are rarely given
 
     if not isinstance(value, Weights):
         raise TypeError(
@@ -461,7 +459,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
             tr, td = map(float, words)
         except ValueError:
             raise DeckError(
-                f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected"
+                f"{source}:{number}: {line.strip()[:60]!r} was found, two numbers 'tr td' were expected"
             ) from None
         windows.append((tr, td))
     if not windows:
@@ -473,7 +471,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
     """Return the windows of the rigid restart segments in a journal; of segments with one number, the last counts."""
-    import json  # imported here to keep the start fast
+    import json  # imported here to start faster
 
     legs: list[tuple[int, bool, float, float]] = []  # number, True if rigid, start, end
     for line in text.splitlines():

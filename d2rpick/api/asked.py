@@ -62,7 +62,7 @@ class RunQuestion(NamedTuple):
         """Options that follow the times in the command line of the same question."""
         from d2rpick.report.tables import (
             make_positional,
-        )  # imported here since most answers repeat no command
+        )  # imported here: most answers repeat no command
 
         return (*self.request.asking(), *make_positional(self.request.history))
 
@@ -110,14 +110,14 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if parts may be only on the card: a table has no parts, and a named energy stands for all."""
+    """Return True if the parts may be used for the card only, because a table has no parts."""
     return bool(request.energy) or not run.parts
 
 
 def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> RunQuestion:
-    """Select the energy of a run that a request asks for, with the data of its deck.
+    """Select the requested energy of a run, with the data of its deck.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(
-                "`parts` recommended stands for a whole set; leave the other `parts` out"
+                "`parts` recommended is a whole set; leave out the other `parts`"
             )
         if request.deck is None:
             raise ArgumentError(
@@ -241,7 +241,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
 
 
 def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
-    """Make the parts one rigid body, with a caution if nothing connects them."""
+    """Make the parts one rigid body, with a caution if they are not connected."""
     from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts
@@ -251,7 +251,7 @@ def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
     bodies = question.settings.bodies or ()
     if len(bodies) > 1:
         apart = list_names([name_units(body.parts) for body in bodies], between="; ")
-        message = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        message = f"--merge {merge} makes one rigid body of unconnected parts: {apart}"
         cautions = (
             *cautions,
             Caution("merged-apart", f"{message}; leave it out to keep them apart"),

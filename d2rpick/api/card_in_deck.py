@@ -19,16 +19,16 @@ UNJOINED: Final = "parts-not-joined"
 def collect_objections(
     card: PrintedCard, question: RunQuestion, parts: int
 ) -> Iterator[Caution]:
-    """Yield the findings of ``check`` in a deck with the card; without a deck, what is unknown about its parts.
+    """Yield the findings of ``check`` in a deck with the card; without a deck, the unknown facts about its parts.
 
     ``parts`` is the number of parts that the card switches by their ids.
     """
     if question.deck is None:
         if parts > 1:
-            message = "no deck of the run was read, so nobody knows whether these parts share nodes"
+            message = "without a deck of the run it is unknown whether these parts share nodes"
             yield Caution(
                 UNJOINED,
-                f"{message}; name the main deck with `deck`, or merge the parts with `merge`",
+                f"{message}; give the main deck as `deck`, or merge the parts with `merge`",
             )
         return
     from tempfile import TemporaryDirectory
@@ -41,7 +41,7 @@ def collect_objections(
         try:
             checked = check_deck(write_deck(question.deck, card, folder)[0])
         except DeckError as error:
-            yield Caution(OBJECTION, f"the card does not go into the deck: {error}")
+            yield Caution(OBJECTION, f"the card does not fit into the deck: {error}")
             return
         for finding in checked.findings:
             if finding.severity is not INFO:

@@ -19,6 +19,7 @@ from d2rpick.base.options import (
     make_option_name,
 )
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,15 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import PairVerdict
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
-_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
+_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled at first use
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
-_ONLY_JUDGED: Final = (
-    "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
-)
+_ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
 
 
 class CardOptions(TypedDict, total=False):
@@ -77,7 +77,7 @@ def _check_option(name: str, value: Any, option: Option) -> Any:
 
 def list_solvers() -> Sequence[str]:
     """Return the names of the solvers whose input can be printed."""
-    from d2rpick.deck.printing import SOLVERS  # imported here to keep the start fast
+    from d2rpick.deck.printing import SOLVERS  # imported here to start faster
 
     return tuple(SOLVERS)
 
@@ -146,7 +146,7 @@ class Cards:
         ]
 
     def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
-        """Return what is printed with the given options, and these parts to switch."""
+        """Return the options of the card with the given parts to switch."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_id_ranges("--node", self.node))
@@ -196,7 +196,7 @@ class Cards:
         return printing, notes
 
     def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, and notes on the bodies that it lacks.
+        """Return the requirements of the deck of the run on a card, and notes on the bodies that it lacks.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -291,6 +291,15 @@ class JudgedCard(NamedTuple):
     def verified(self) -> bool:
         """True if all windows are verified."""
         return all(verdict.verified for verdict in self.verdicts)
+
+    @property
+    def worst(self) -> Decision | None:
+        """Verdict on the worst of the judged windows; None if none was judged."""
+        return min(
+            (verdict.decision for verdict in self.verdicts),
+            key=lambda decision: GRADES.index(decision.grade),
+            default=None,
+        )
 
     @property
     def passed(self) -> bool:
@@ -430,7 +439,7 @@ def print_card(
         return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
     from d2rpick.api.asked import (
         ask_run,
-    )  # imported here since a card alone does not need numpy
+    )  # imported here: a card alone does not need numpy
 
     question = ask_run(run, request, card_alone=True)
     solver = cards.solver or find_solver(question.reference.history.format)

@@ -128,7 +128,7 @@ def check(
     """
     from d2rpick.api.asked import (
         make_request,
-    )  # imported here since nothing is computed without a history
+    )  # imported here: without a history nothing is computed
 
     names = arguments.list_paths("decks", decks)
     if history is not None:
@@ -173,7 +173,7 @@ def find_findings(
     else:
         from d2rpick.rules.judgement import (
             HistoryJudge,
-        )  # imported here since it loads numpy
+        )  # imported here: it loads numpy
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
@@ -215,7 +215,7 @@ def _check_each(
     visited: set[str] = set()
     real_folder = cache(
         os.path.realpath
-    )  # cached since it asks the system for each parent folder
+    )  # cached, because it asks the system for each parent folder
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )

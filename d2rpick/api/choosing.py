@@ -1,4 +1,4 @@
-"""Keyword arguments that say how to choose and judge.
+"""Define the keyword arguments for choosing and judging.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """
@@ -17,9 +17,10 @@ class JudgingOptions(TypedDict, total=False):
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td is earlier by the margin (default: found from the record).  ``margin``: time kept free after the load
     and before the next contact (default: 0; derived if d2rpick chooses td, or with ``landing``).  ``tolerance``:
-    largest lock-in error, or level error if no oscillator describes the record (default: 0.2).  ``max_kinetic_share``:
-    reject a td with a larger kinetic share.  ``max_residual``: reject a pair with a larger residual.  ``min_quality``:
-    lowest grade that is not reported as a problem (exit code 1) (default: fair; poor if only ``td`` is given).
+    largest frozen-deformation error, or level error if no oscillator describes the record (default: 0.2).
+    ``max_kinetic_share``: reject a td with a larger kinetic fraction.  ``max_residual``: reject a pair with a larger
+    residual.  ``min_quality``: lowest grade that is not reported as a problem (exit code 1) (default: fair; poor if
+    only ``td`` is given).
     """
 
     after: float | None
@@ -37,7 +38,7 @@ class Choosing(JudgingOptions, total=False):
     ``fit_window``: window of time in which the oscillator is identified.  ``strict``: recommend nothing if only the
     energy shows when the load ends (default: False).  ``keep_vibration``: grade the vibration by its own error, also
     if that is small in the next contact (default: False).  ``cost_share``: share of the cost of a time step that the
-    elements of the switched parts take, to predict the run time.  ``step_ratio``: ratio of the time step while rigid
+    elements of the switched parts take, to predict the CPU time.  ``step_ratio``: ratio of the time step while rigid
     to the one before, 1 or more (default: 1).  ``oscillator``: given instead of identified, with ``v0``.  ``v0``:
     velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy level alone, without an
     oscillator (default: True).

@@ -1,4 +1,4 @@
-"""Determine which parts may be switched and what sets of them save; fit the cost of elements to runs of a site."""
+"""Determine which parts may be switched and the savings of sets of parts; fit element costs to runs of a site."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def parts(
     td: float | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Determine which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and the savings of sets, as ``d2rpick parts`` does.
 
     Parameters
     ----------

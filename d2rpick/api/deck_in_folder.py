@@ -1,4 +1,4 @@
-"""Find the main deck in the folder of a run: with it, a folder alone shows which parts become one rigid body."""
+"""Find the main deck in the folder of a run, which shows the parts that become one rigid body."""
 
 from __future__ import annotations
 
@@ -44,5 +44,5 @@ def name_deck(request: Request) -> tuple[Caution, ...]:
     """Return a caution that names the deck found in the folder of the run."""
     if not request.deck_in_folder:
         return ()
-    message = f"{request.deck} is the main deck in the folder of the run and was read; `no_deck` does without it"
+    message = f"{request.deck} is the main deck in the folder of the run and is used; `no_deck` ignores it"
     return (Caution(FOUND, message),)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # shortest time between td and a contact [s]
 _SHORTEST = 2e-3
-# cost of a cycle with rigid parts over one with deformable parts, if the deck does not determine it
+# cost of a cycle with rigid parts relative to a deformable one, if the deck does not determine it
 _UNKNOWN = 0.5
 
 
@@ -122,11 +122,11 @@ class Driving:
             computed = journal.all("ended")
             if computed and not resume:
                 raise D2RPickError(
-                    f"{folder}: this run has begun; --resume goes on with it, or choose another folder"
+                    f"{folder}: this run has begun; continue it with --resume, or choose another folder"
                 )
             if computed and begun[0]["deck"] != digest:
                 raise D2RPickError(
-                    f"{folder}: begun with another deck than {self.name} is now; name that one"
+                    f"{folder}: this run was begun with another deck than {self.name} is now; give that deck"
                 )
             if not begun and any(
                 not file.name.startswith(".") for file in folder.iterdir()
@@ -197,7 +197,7 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the saved share if a deformable run takes as long per time as the deformable segments do on average."""
+    """Return the saved share if a deformable run takes the mean time of its deformable segments throughout."""
     if any(leg.cpu is None for leg in legs):
         return None
     deformable = [leg for leg in legs if not leg.order.rigid]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
+MOST_REPLAYED = 10_000_000  # a longer text would have some gigabytes
 HISTORIES = (
     "csv",
     "hdf5",
@@ -106,11 +106,11 @@ class Motion:
             )
         if not given_names:
             raise ArgumentError(
-                "the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0"
+                "the motion needs a start: give --v0, or some of --z0, --y0, --vz0 and --vy0"
             )
         _ = self.oscillator
         if (self.tr is None) != (self.td is None):
-            raise ArgumentError("--tr and --td need each other")
+            raise ArgumentError("give --tr and --td together")
         if self.tr is not None and self.td is not None and not self.tr < self.td:
             raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
         if self.t_end / self.dt > MOST_REPLAYED:
@@ -134,7 +134,9 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        assert oscillator is not None  # the options that define it are required
+        assert (
+            oscillator is not None
+        )  # click requires the options that define an oscillator
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
@@ -274,9 +276,7 @@ def _check_windows(
 ) -> None:
     """Raise ArgumentError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
-        raise ArgumentError(
-            "--tr and --td need each other, as many of the one as of the other"
-        )
+        raise ArgumentError("give one --td for each --tr")
     previous_end = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:
@@ -339,6 +339,6 @@ def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
     return (
         Caution(
             "energy-balance",
-            f"{message}; these parameters are beyond what the model can do",
+            f"{message}; choose parameters closer to the defaults",
         ),
     )

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times
 
-_STEPS: Final = 200  # number of td that are explored
+_STEPS: Final = 200  # number of td to explore
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -319,7 +319,7 @@ def plan_for_question(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # as on its standard input, a line for each
+    )  # windows as `check` reads them on standard input, one line each
     times += [
         text
         for name in (before.sources if before else ())
@@ -340,7 +340,7 @@ def write_planned_deck(
     from d2rpick.rules.judgement import HistoryJudge
 
     question = plan.question
-    done = card.card.windows[: len(plan.done)]  # the times as printed
+    done = card.card.windows[: len(plan.done)]  # windows with the times as printed
     names = write_deck(
         question.request.deck or "", card.card, folder, overwrite=overwrite
     )

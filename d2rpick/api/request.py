@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
 
-MIN_MEAN_ENERGY: Final = 0.7  # relative to the reference run; in well switched computed runs it was 0.77 or more
-# Options that say how a history is read, and of these all but the parts, which a deck says itself.
+MIN_MEAN_ENERGY: Final = (
+    0.7  # relative to the reference run; well-switched computed runs had at least 0.77
+)
+# Options for reading a history, and all of them except the parts, which a deck defines itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
@@ -51,8 +53,8 @@ ADVANCED: Final = (
 )
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Placeholder for weights that are no file: typed as it is, the command line is refused, so that it never uses other
-# weights.
+# Placeholder for weights without a file.
+# A command line with it is refused, so that it never uses other weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -62,7 +64,7 @@ def _make_oscillator_option(text: str, kind: Number = POSITIVE, *others: str) ->
 
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ReadingOptions:
-    """Which run is meant, and how its files are read."""
+    """Selection of a run, and how its files are read."""
 
     deck: str | None = make_option(
         "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
@@ -104,8 +106,8 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
-# start.
+# Not frozen although it is never changed, like other tables of options.
+# Frozen classes cost each command 2 % of its start.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
@@ -173,7 +175,7 @@ class Request(ChoiceOptions, ReadingOptions):
         """Refuse options that need a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
-                "`step_ratio` needs `cost_share` or `deck` too: the run time needs both"
+                "`step_ratio` needs `cost_share` or `deck` too: the CPU time depends on both"
             )
         if self.weights is not None and self.deck is None:
             raise ArgumentError(
@@ -223,10 +225,10 @@ class Request(ChoiceOptions, ReadingOptions):
         if oscillator is not None and self.v0 is not None:
             from d2rpick.vibration.oscillator import (
                 to_mode,
-            )  # imported here since it is rarely given
+            )  # imported here: it is rarely given
 
             mode = to_mode(oscillator, self.v0)
-        # the settings have their own defaults for what the question leaves open
+        # options without a value keep the defaults of the settings
         chosen = {
             name: getattr(self, name)
             for name in _USES

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class FirstRun(NamedTuple):
-    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what the run cannot know.
+    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on unknown facts.
 
     ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """
@@ -75,7 +75,7 @@ def first(
     >>> d2.first("sample_data/rollover_box.k", "first", parts=1)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    d2rpick.base.errors.ArgumentError: `wait` is not given, and sample_data/rollover_box.k does not tell it: ...
+    d2rpick.base.errors.ArgumentError: `wait` cannot be derived from sample_data/rollover_box.k (no masses...)...
     """
     from d2rpick.deck.writing import write_deck
     from d2rpick.running.first import first_card
@@ -136,14 +136,14 @@ def follow(
     >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
-    from d2rpick.running import watch  # imported here since `first` does not need it
+    from d2rpick.running import watch  # imported here: `first` does not need it
 
     selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
     if deck is not None:
         from d2rpick.deck import (
             read_inventory,
-        )  # imported here since a deck is rarely named
+        )  # imported here: a deck is rarely named
 
         inventory = read_inventory(arguments.check_path("deck", deck))
     time = arguments.check_optional_number("wait", wait)

@@ -1,4 +1,4 @@
-"""Give scripts a run: read from files or from memory, or taken from a table."""
+"""Provide a run for scripts: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Run:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out or assumed while reading."""
+        """Notes on omissions and assumptions of the readers."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
@@ -406,7 +406,7 @@ def make_selection(
 def extract_columns(
     run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Return the selected columns of a run with all that is known at its times, and the notes on them.
+    """Return the selected columns of a run with all quantities known at its times, and notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum that shows the flight, each of shape (n,).

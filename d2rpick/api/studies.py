@@ -235,7 +235,7 @@ def compute_rows(
 
 
 def compute_fingerprint(question: Question) -> str:
-    """Return a digest of all that a row depends on besides its files: options and version, not the drawn curves."""
+    """Return a digest of everything that affects a row besides its files: options and version, not curves."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -257,7 +257,7 @@ def write_row(row: StudyRow, question_digest: str) -> str:
 
 
 class Ledger:
-    """A file of finished rows, one a line; it need not exist yet.
+    """A file of finished rows, one per line; it may be missing at first.
 
     Damaged lines are skipped, among them an incomplete last line of a killed study.
 
@@ -345,11 +345,9 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Return how many of ``runs`` runs were taken from the file, and why other rows of it were not."""
+        """Return the number of ``runs`` runs taken from the file, and why other rows were not used."""
         if self.outdated:
-            outdated = (
-                f"; {self.outdated} have changed, or were computed with other options"
-            )
+            outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:
             outdated = ""
         if self.damaged:
@@ -364,7 +362,7 @@ class Ledger:
             FAILED,
             UNREADABLE,
             INTERNAL_ERROR,
-        ):  # computed again next time
+        ):  # such a row is computed again next time
             return
         try:
             append_as_a_whole(

@@ -313,7 +313,7 @@ def check_pair(tr: float | None, td: float | None, switched: object) -> None:
     """Refuse an incomplete pair: without a switched run both times are needed."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
-            f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
+            f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
         )
 
 
@@ -324,7 +324,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, from which times that are not given are read."""
+    """Judge a pair, also by a finished switched run, which gives the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

@@ -74,7 +74,7 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}
         )
-    if hasattr(table, "to_pandas"):  # pyarrow and others
+    if hasattr(table, "to_pandas"):  # tables of pyarrow and other libraries
         frame = table.to_pandas()
         if isinstance(frame, pd.Series):
             return frame.to_frame(_SERIES_NAME)

@@ -1,4 +1,4 @@
-"""Times that are typed with a unit, as numbers in the unit of the run."""
+"""Convert times typed with a unit to numbers in the unit of the run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def find_time_unit(
 
 
 def convert_typed_time(text: str, unit: str, source: str) -> float:
-    """Return a time with its unit as a number in the ``unit`` of a run; empty if it is not known from ``source``.
+    """Return a time with its unit as a number in the ``unit`` of a run; error if ``source`` names no unit.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""``cached_property`` of Python 3.12 for Python 3.11 too, whose own takes a lock (3 % of the check of a small deck)."""
+"""Provide Python 3.12's ``cached_property`` for Python 3.11, whose own version takes a lock (3 % of a small check)."""
 
 from __future__ import annotations
 

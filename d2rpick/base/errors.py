@@ -1,4 +1,4 @@
-"""Errors and cautions, each in one line: the place, what was found, what was expected, and what to do."""
+"""Define errors and cautions of one line each: the place, the value found, the value expected, and the cure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-# Unicode categories to be escaped: control and format characters (escape codes, text direction), line separators.
+# Unicode categories that are escaped: control and format characters (escape codes, text direction), line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
 _MOST_NAMED: Final = 20  # names in one message
@@ -29,15 +29,15 @@ class FormatError(D2RPickError):
 
 
 class ChangedError(D2RPickError):
-    """A file was rewritten while it was read: its content mixes two states and cannot be used."""
+    """A file was rewritten while it was read, so its content mixes two states and cannot be used."""
 
 
 class HistoryError(D2RPickError):
-    """Numbers were read, but they do not make an energy history."""
+    """Numbers were read, but they do not form an energy history."""
 
 
 class RangeError(D2RPickError):
-    """A time or a parameter is outside what the history or the mechanics allow."""
+    """A time or a parameter is outside the range that the history or the mechanics allow."""
 
 
 class DeckError(D2RPickError):
@@ -64,7 +64,7 @@ FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return what ``read`` returns, or None if a history does not contain it in every state."""
+    """Return what ``read`` returns, or None if the history lacks it in some state."""
     try:
         return read()
     except FormatError:
@@ -138,7 +138,7 @@ def format_ranges(ids: Iterable[int]) -> list[str]:
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:
-    """Return a short list of part ids for a message; of many parts the first ones and the number of the others.
+    """Return a short list of part ids for a message; a long list is cut, with the number of the remaining ids.
 
     Examples
     --------
@@ -159,7 +159,7 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
 
 
 def choose_verb(things: Collection[object]) -> str:
-    """Return "is" for one thing, else "are"."""
+    """Return "is" for one thing, otherwise "are"."""
     return "is" if len(things) == 1 else "are"
 
 

@@ -1,4 +1,4 @@
-"""Reading and writing files: bounds on their content, changes while they are read, and replacing them as a whole.
+"""Read and write files: limits on their content, changes while they are read, and complete replacement.
 
 Lines of JSON that a program resumes from have a checksum, so that a damaged line is recognised.
 """
@@ -21,22 +21,27 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 STDIN: Final = "-"  # name of standard input
-# Bounds on a file, each with its default and its unit.
+# Limits on a file, each with its default and its unit.
 _BOUNDS: Final = {
-    "RATIO": (100.0, "times as many bytes"),  # a history unpacks to 3 to 30 times
-    "UNPACKED": (4e9, "bytes"),  # unpacked data are held in memory
-    "LINE": (1e6, "bytes"),  # some 50,000 columns
+    "RATIO": (
+        100.0,
+        "times as many bytes",
+    ),  # a history unpacks to 3 to 30 times its size
+    "UNPACKED": (4e9, "bytes"),  # unpacked data are kept in memory
+    "LINE": (1e6, "bytes"),  # bytes of some 50,000 columns
     "DEPTH": (100.0, "groups"),
 }
-# Unpacked bytes above which the ratio is checked: constant columns pack a thousandfold, and less is quickly unpacked.
+# Unpacked size from which the ratio is checked: constant columns shrink by a factor of 1000, and less is unpacked fast.
 _ALLOWED: Final = 1 << 24
 _TRIES: Final = 5  # attempts to read a file that keeps changing
-_TICK: Final = 50_000_000  # [ns] above the resolution of most file times: later changes are visible
-# [ns] the same for file systems that store whole seconds
+_TICK: Final = (
+    50_000_000  # [ns] resolution of most file times: later changes are visible
+)
+# [ns] the same for file systems that store full seconds
 _COARSE: Final = 2_000_000_000
 # [ns] needed to write a byte: the times of a file are set when its last write begins
 _SLOWEST: Final = 5
-# [s] waited for a write in progress: until it ends, the file has only part of its content
+# [s] pause for a write in progress, during which the file is incomplete
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
@@ -47,11 +52,11 @@ class Searched(Protocol):
     def __len__(self) -> int: ...
 
     def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
-        """Return the offset of the last occurrence of ``wanted`` between two offsets, -1 if there is none."""
+        """Return the offset of the last occurrence of ``wanted`` between two offsets, or -1."""
 
 
 def bound(name: str) -> float:
-    """Return a bound; raise D2RPickError if the environment sets it to something other than a number above 0."""
+    """Return a limit; raise D2RPickError if the environment sets it to something other than a positive number."""
     variable = f"D2RPICK_MAX_{name}"
     text = os.environ.get(variable)
     try:
@@ -66,7 +71,7 @@ def bound(name: str) -> float:
 
 
 def describe_excess(name: str, value: float = float("inf")) -> str:
-    """Return a message that a value exceeds its bound, and what to do; empty if it does not.
+    """Return a message if a value exceeds its limit, with the cure; otherwise an empty text.
 
     Examples
     --------
@@ -81,13 +86,13 @@ def describe_excess(name: str, value: float = float("inf")) -> str:
 
 
 def describe_unpacked_excess(packed: int, unpacked: int) -> str:
-    """Return a message if ``packed`` bytes unpack to more bytes than the bounds allow; empty otherwise."""
+    """Return a message if ``packed`` bytes unpack to more bytes than the limits allow; otherwise empty."""
     ratio = unpacked / max(packed, 1) if unpacked > _ALLOWED else 0.0
     return describe_excess("UNPACKED", unpacked) or describe_excess("RATIO", ratio)
 
 
 def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
-    r"""Return the address of a line that exceeds the bound, -1 if there is none; only part of the data is searched.
+    r"""Return the offset of a line that exceeds the limit, or -1; only a part of the data is searched.
 
     ``most`` is the bound, if it is known already.
 
@@ -107,7 +112,7 @@ def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 
 class FileState(NamedTuple):
-    """Identity, size and times of a file; ``settled`` if no write is in progress and a later one would change them."""
+    """Identity, size and times of a file; ``settled`` if no write is in progress and later writes are visible."""
 
     device: int
     inode: int
@@ -149,19 +154,19 @@ class FileState(NamedTuple):
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Return True if this is the earlier file, perhaps grown; a new file may have the inode of an old one."""
+        """Return True if this is the same file, which may have grown; a new file may have the inode of an old one."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
 
 
 def compute_slowness(changed: int, size: int) -> int:
-    """Return how much longer than usual a write may take, or a change stay invisible in the times [ns]."""
+    """Return how much longer than usual a write may take, or a change may stay invisible in the times [ns]."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
 def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
-    """Return the state of a file once no write is in progress and a later one will show; None if it keeps changing.
+    """Return the state of a file after pending writes; None if the file keeps changing.
 
     If the file ``may_grow``, the bytes up to the size of this state do not change: further bytes are appended.
     """
@@ -182,7 +187,7 @@ def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState
 def wait_for_settled_states(
     names: Sequence[str], error: type[D2RPickError]
 ) -> list[FileState]:
-    """Return the settled states of files that may grow, with one pause for all; ``error`` if one keeps changing."""
+    """Return the settled states of growing files, with one pause for all; ``error`` if one keeps changing."""
     states = [_state_of(name) for name in names]
     for _ in range(_TRIES):
         moving = [state for state in states if not state.settled]
@@ -203,7 +208,7 @@ def wait_for_settled_states(
 
 
 def _settle(name: str, state: FileState) -> FileState:
-    """Return the state of a file, settled if the file has not changed since ``state`` but for growing."""
+    """Return the state of a file, settled if the file has only grown since ``state``."""
     now = state if state.settled else _state_of(name)
     return state._replace(settled=True) if now.continues(state) else now
 
@@ -216,7 +221,7 @@ def _state_of(name: str) -> FileState:
 def read_at_rest(
     name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False
 ) -> FileState | bytes:
-    """Return the `settled_state` of a file, or all bytes of a pipe or a terminal, which can be read only once.
+    """Return the settled state of a file, or all bytes of a pipe or terminal, which can be read only once.
 
     Raise ``error`` if the file keeps changing, or is another device: /dev/zero and /dev/full never end.
     """
@@ -236,7 +241,7 @@ def read_at_rest(
 
 
 def write_as_a_whole(path: Path, content: bytes) -> None:
-    """Write a file as a whole or not at all: to a temporary file in the same folder, which then replaces it.
+    """Write a file completely or not at all: a temporary file in the same folder replaces it at the end.
 
     A replaced file keeps its mode, and its owner and group as far as the user may set them. A link stays, and the
     file to which it points is replaced; a device or a named pipe is written to.
@@ -252,7 +257,7 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
         path = path.absolute()
     if path.is_symlink():  # the rest of a loop
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
-    # The name of the file may have the largest possible length, so that no longer name can be made from it.
+    # The name of the file may have the largest possible length, so no longer name can be derived from it.
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
     scratch = path.parent / temporary
     try:
@@ -282,7 +287,7 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
 
 
 def append_as_a_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
-    """Append to a file as a whole or not at all; ``durable`` waits for the disk; an OSError leaves it as it was."""
+    """Append to a file completely or not at all; ``durable`` waits for the disk; an OSError changes nothing."""
     size = None
     try:
         with path.open("ab") as file:

@@ -1,4 +1,4 @@
-"""Search in a graph: everything that can be reached from some nodes."""
+"""Search a graph for everything that can be reached from given nodes."""
 
 from __future__ import annotations
 

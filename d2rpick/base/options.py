@@ -1,4 +1,4 @@
-"""Describe an option once: the text of its help, the kind of its value, and what its value limits.
+"""Describe an option once: its help text, the kind of its value, and the limits of its value.
 
 The command line, the arguments of Python and the settings of a choice are made from tables of such options: dataclasses
 whose fields are made by `make_option`.

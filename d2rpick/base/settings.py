@@ -1,4 +1,4 @@
-"""The settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml.
+"""Read the settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml.
 
 The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
 """
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
-_OF_REPOSITORIES: Final = (".git", ".hg")  # in the root of a repository
+_OF_REPOSITORIES: Final = (".git", ".hg")  # present in the root of a repository
 # Settings of the deck check, which are searched from the folder of each deck.
 RULE_KEYS: Final = ("select", "ignore", "severity")
-# Characters that may stand around the pieces of a dotted key.
+# Characters that may surround the pieces of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
 _LONGEST_VALUE: Final = 60  # characters of a value in a message
 
@@ -90,7 +90,7 @@ def _list_searched_folders(folder: str) -> Iterator[str]:
 
 
 def _is_owned_by_user(path: str) -> bool:
-    """Return True if the user owns a file or folder, and the link that leads to it; True on Windows."""
+    """Return True if the user owns a file or folder and the link to it; always True on Windows."""
     if not hasattr(os, "geteuid"):
         return True
     user = os.geteuid()
@@ -136,7 +136,7 @@ def refuse_unknown_settings(
 
 
 def _has_settings(path: str) -> bool:
-    """Return True if a pyproject.toml that is not used has settings for d2rpick; False if it cannot be read."""
+    """Return True if an unused pyproject.toml has settings for d2rpick; False if it cannot be read."""
     try:
         return _read_table(path, shared=True) is not None
     except ConfigurationError:
@@ -144,7 +144,7 @@ def _has_settings(path: str) -> bool:
 
 
 def _may_have_settings(text: str) -> bool:
-    """Return False if a pyproject.toml cannot define ``tool.d2rpick``, which saves the import of a parser."""
+    """Return False if a pyproject.toml cannot define ``tool.d2rpick``, which avoids importing a parser."""
     solid = text.translate(_UNIMPORTANT)
     return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
 
@@ -160,7 +160,7 @@ def _read_table(path: str, *, shared: bool) -> object:
         import tomllib
 
         table = tomllib.loads(text)
-        # Python refuses to print numbers of thousands of digits, which a message might have to
+        # Python refuses to print numbers with thousands of digits, which a message may contain
         repr(table)
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None

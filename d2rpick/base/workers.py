@@ -1,4 +1,4 @@
-"""Computing many calls: in this process, in a pool of processes, or on a Dask cluster."""
+"""Compute many calls: in this process, in a pool of processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# A fork copies the locks of all threads; forking from one clean process avoids this and is nearly as quick.
+# A fork copies the locks of all threads; forking from one clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Calls that wait for each process in addition to the running one: they keep it busy and need little memory.
+# Number of waiting calls for each process: they keep it busy and need little memory.
 _WAITING = 2
-# Least number of calls given to a cluster, whose workers may come and go.
+# Fewest calls given to a cluster, whose workers may come and go.
 _LEAST_ON_CLUSTER = 64
-# Attempts to start a pool: after the first one, the process from which others are forked is restarted if it was killed.
+# Attempts to start a pool: after the first one, the process from which workers are forked is restarted.
 _STARTS = 3
 _DYING = 0.1  # [s] between attempts, in which the system ends a killed process
 # Errors of starting a process if the process from which it is forked was killed.
@@ -56,7 +56,7 @@ def count_cores() -> int:
 
 
 class Finished(NamedTuple):
-    """The result of the call for the item of this number, or the error that ended it."""
+    """The result of the call for one item, or the error that ended it."""
 
     number: int
     result: Any
@@ -106,7 +106,7 @@ class Cores(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls, of which up to ``room`` are computed or wait at a time.
+        """Yield the results of all calls; up to ``room`` of them are computed or wait at the same time.
 
         If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
         and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
@@ -181,13 +181,15 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 
 def _begin_work(held: Connection) -> None:
-    """End this process when the other end of ``held`` is closed; on interrupts without a message."""
-    # true in a spawned process; in a forked one `interruptible` has changed it
+    """End this process when the other end of ``held`` is closed, and on interrupts without a message."""
+    # True in a spawned process; in a forked one `interruptible` has changed it
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
-        held.poll(None)  # nothing is ever sent
+        held.poll(
+            None
+        )  # waits until the other end is closed, since nothing is ever sent
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
@@ -199,7 +201,7 @@ def start_importing(processes: int, module: str) -> None:
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
     if processes > 1:
-        # numpy reads this when it is imported: with several processes, threads would only compete for the cores
+        # numpy reads this when it is imported: with several processes, threads would compete for the cores
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
             _start_server(module)
@@ -207,10 +209,13 @@ def start_importing(processes: int, module: str) -> None:
 
 def _start_server(module: str) -> None:
     """Start the process from which others are forked; an interrupt ends it without a message even while it imports."""
-    from multiprocessing import forkserver, resource_tracker  # not on every system
+    from multiprocessing import (
+        forkserver,
+        resource_tracker,
+    )  # Windows has no fork server
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # its start would unblock SIGINT
+    resource_tracker.ensure_running()  # starting it would unblock SIGINT
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
@@ -255,7 +260,7 @@ class Cluster(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; up to ``room`` are at the scheduler, which repeats a call if its worker dies.
+        """Yield the results of all calls; up to ``room`` are at the scheduler, which repeats calls of dead workers.
 
         Calls are submitted in groups of at least half of ``room``, since each message costs as much as a call.
         """

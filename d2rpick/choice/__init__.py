@@ -1,4 +1,4 @@
-"""Choose tr and td: from a history to a recommendation, a verdict on a pair, a plan, or one answer for many runs.
+"""Choose tr and td: from a history to a recommendation, a verdict, a plan, or one answer for many runs.
 
 The question (`question`) is a reference run, the energy of it that is meant, and the settings.  It is answered in
 these steps:

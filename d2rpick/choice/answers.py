@@ -1,4 +1,4 @@
-"""Answer ``suggest`` and ``verify``: recommend a pair, with its rivals and a better td, or judge a given pair.
+"""Answer ``suggest`` and ``verify``: recommend a pair with alternatives, or judge a given pair.
 
 The command line, ``study``, ``check --history``, ``card`` and Python all call these functions, so that they give the
 same numbers.
@@ -59,13 +59,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# Number of pairs at other peaks that may fail the full examination before the search is given up.
+# Most pairs at other peaks that are examined in full and refused before the search ends.
 _MOST_REFUSED = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PairVerdict(AnswerAtTd):
-    """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
+    """Answer of ``verify``: the measures of one pair, and the reasons for and against it.
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``computed`` is the energy of the finished
     switched run, if there is one.
@@ -91,13 +91,13 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def decision(self) -> Decision:
-        """Verdict on the pair, with reason and cure."""
+        """Verdict on the pair, with its reason and cure."""
         decision = self._decide(None)
         return self._decide(self.better) if decision.grade == POOR else decision
 
     def _decide(self, better: Pair | None) -> Decision:
-        """Decide on the pair; ``better`` is a better one, if known."""
-        unknown = () if self.reasons else ("nothing shows that tr suits this td",)
+        """Decide on the pair; ``better`` is a better pair, if one is known."""
+        unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         return decide(
             self.situation,
@@ -111,17 +111,17 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A pair that is not poor: another tr for this td, or a pair at the nearest better td; None without one."""
+        """A better pair that is not poor, with another tr for this td or at the nearest better td; None without one."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
     def _good_pair(self) -> Pair | None:
-        """The pair that the reference run recommends, whatever a finished switched run says."""
+        """The pair recommended by the reference run, regardless of a finished switched run."""
         return find_good_pair(self.situation)
 
     @property
     def _is_refuted(self) -> bool:
-        """True if the finished switched run objects to the pair that the reference run recommends.
+        """True if the finished switched run contradicts the pair recommended by the reference run.
 
         Any tr within the timing tolerance is that pair.
         """
@@ -153,7 +153,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is used if its td is ``td``.
+    """Judge one pair; the situation ``earlier`` is reused if its td is ``td``.
 
     Raises
     ------
@@ -218,7 +218,7 @@ class AcceptableWindow(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PairSuggestion(AnswerAtTd):
-    """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
+    """Answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
     ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
     in it, if much rigid time was given up for quality.
@@ -239,7 +239,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def why_none(self) -> str:
-        """Reason why nothing is recommended; empty if a pair is."""
+        """Reason why no pair is recommended; empty if one is."""
         return "; ".join(
             caution.message
             for caution in self.cautions
@@ -296,7 +296,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The clearly better pair if its residual shows that it is not poor, else None."""
+        """The clearly better pair if its residual shows that it is not poor, otherwise None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
@@ -321,7 +321,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair if it is better than the recommended one by more than the limit of equal quality, else None.
+        """The better pair if its quality differs clearly from that of the recommended pair, otherwise None.
 
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
@@ -352,7 +352,7 @@ def suggest_in_history(
 def suggest_at(
     situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
 ) -> PairSuggestion:
-    """Rank the candidates for tr in a known situation, recommend one, and search for a better td.
+    """Rank the candidates for tr in a given situation, recommend one, and search for a better td.
 
     ``ranked`` are the ranked candidates if they are known, up to the recommended one at least.
     """
@@ -370,21 +370,21 @@ def suggest_at(
         cautions.append(
             Caution(
                 "no-better-td",
-                "no peak of the energy in the flight has an acceptable tr",
+                "no peak of the energy in the flight has an admissible tr",
             )
         )
     return PairSuggestion(situation, candidates, better, tuple(cautions))
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair at the nearest energy peak of the flight that has one; None without any.
+    """Return the recommended pair at the nearest energy peak of the flight with such a pair; None without one.
 
     The record is examined anew at that td, so that the pair is the answer to a question for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # if nothing shows the end of the flight, do not search after td
+    # if the end of the flight is unknown, do not search after td
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -410,7 +410,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair that is not poor: the recommended tr for this td, else the pair of the nearest better td."""
+    """Return a pair that is not poor: the recommended tr for this td, or the pair of the nearest better td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -421,7 +421,7 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _is_level_refused(situation: Situation) -> bool:
-    """Return True if no tr can suit the level at td, which is negative or too high.
+    """Return True if no tr can have the level at td, because it is negative or too high.
 
     Noise makes thousands of such peaks, so that this test saves time.
     """
@@ -435,20 +435,20 @@ def _is_level_refused(situation: Situation) -> bool:
 
 
 def _find_saving_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair at a td if it saves run time, else None."""
+    """Return the recommended pair at a td if it saves run time, otherwise None."""
     return next(rank_candidates([situation], in_flight=True)).saving
 
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
-    """Examine the same record at another td, as if that td had been given."""
-    # an oscillator is searched again, the reason why there is none is not
+    """Examine the same record at another td, as if the user had given that td."""
+    # an oscillator is searched again, but not the reason for its absence
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` accepts a pair once it is rounded to the six printed digits."""
-    # rounding moved a time beyond the record, or both onto each other
+    # rounding moved a time beyond the record, or made both equal
     try:
         return verify_at(
             _examine_anew(situation, round_as_read(td)), round_as_read(tr)
@@ -461,13 +461,16 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     """Return the reason why no candidate is acceptable."""
     if not ranked:
         level = situation.energy_td
-        return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
+        return (
+            f"before td = {situation.td:.6g} the energy neither reaches its value at td, {level:.6g}, nor "
+            "peaks near it"
+        )
     if situation.td > situation.latest_td:
         return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
-    return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"
+    return f"no tr is admissible; the best of {len(ranked)}, tr = {nearest.tr:.6g}: {reasons}"
 
 
 _Answer = TypeVar("_Answer", PairSuggestion, PairVerdict)
@@ -482,7 +485,7 @@ def suggest_in_run(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
-    """Choose tr for ``td``, or both times with td in a window (low, high), or for None in the longest flight [time].
+    """Choose tr for ``td``, or both times with td in a window (low, high), or in the longest flight for None [time].
 
     With ``with_better`` False no better td is searched for a given td.  If td is chosen, no flight is assumed to begin
     before ``since``, and ``times`` are tried besides the energy peaks, by default an even grid [time].
@@ -518,7 +521,7 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair of a reference run; errors and ``earlier`` as for one pair of a history."""
+    """Judge one pair of a reference run; errors and ``earlier`` are those of `verify_in_history`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     return _add_health(
         verify_in_history(reference.history, tr, td, settings, earlier), reference.run
@@ -531,7 +534,7 @@ def compare_with(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> PairVerdict:
-    """Add to a verdict the comparison of a finished switched run with the reference run that the verdict is based on.
+    """Add to a verdict the comparison of a finished switched run with the reference run of the verdict.
 
     Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
     of the reference run [-].
@@ -558,7 +561,7 @@ def compare_with(
 
 
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
-    """Add the health of the run in the rigid window, else in the flight up to td, with its warnings.
+    """Add the health of the run in the rigid window, or else in the flight up to td, with its warnings.
 
     The time after td does not matter for the choice.
     """

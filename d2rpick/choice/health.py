@@ -1,4 +1,4 @@
-"""Judge the health of a run: whether its energies can be trusted, what acts in the window, and when to refuse it.
+"""Judge the health of a run: whether its energies are reliable, which loads act in the window, and when to refuse it.
 
 A term that the files do not have gives None, never 0.  Shares refer to the peak of the internal energy, as is usual in
 practice, and are left out if that peak is tiny.
@@ -25,25 +25,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
 
-# Largest hourglass energy as a share of the peak internal energy, for the model and for each part: rule of thumb of
-# DYNAmore (dynasupport.com/howtos/element/hourglass); NCHRP Web-Only Document 179 (2010), table E-1, has the same 10 %.
+# Largest hourglass energy as a share of the peak internal energy, for the model and for each part.
+# Sources: rule of thumb of DYNAmore (dynasupport.com/howtos/element/hourglass), 10 %;
+# NCHRP Web-Only Document 179 (2010), table E-1, 10 %.
 MOST_HOURGLASS = 0.10
 # Largest variation of the total energy: NCHRP Web-Only Document 179 (2010), table E-1.
 MOST_IMBALANCE = 0.10
-# Largest contact energy without friction, as a share of the peak internal energy
-# (dynasupport.com/howtos/general/contact-energy). Negative energy has no physical cause but comes from penetrations;
-# Oasys' energy check allows 5 % of either sign.
+# Largest contact energy without friction, as a share of the peak internal energy.
+# Source: dynasupport.com/howtos/general/contact-energy.
+# Negative contact energy has no physical cause but comes from penetrations; Oasys' check allows 5 % of either sign.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# In free flight contacts do not work either.  Deleted elements may not hold more: LS-DYNA keeps their energy in the
-# internal energy of the model (ftp.lstc.com, FAQ energy_balance).
+# In free flight contacts do no work, and deleted elements may not have more energy than this share.
+# LS-DYNA keeps their energy in the internal energy of the model (ftp.lstc.com, FAQ energy_balance).
 
-# Internal energy below this share of the largest energy of the run, or below this floor, is rounding: single precision
-# and glstat print six to seven digits of the sum. LS-DYNA's internal energy starts at a floor of 2e-20 per process.
+# Internal energies below this share of the largest energy of the run, or below this floor, are rounding errors.
+# Single precision and glstat have six to seven digits; LS-DYNA's internal energy starts at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
-# A part with less than this share of the largest internal energy of a part does not matter for the sum [-].
+# Parts below this share of the largest internal energy of a part do not matter for the sum [-].
 _SMALL_PART = 0.01
-# While a run has hardly any energy, a small error is a large ratio (Altair, Radioss FAQ on the energy error). The ratio
-# is used while its reference exceeds this share of its peak; then 10 % are 1 % of the peak or more.
+# While a run has hardly any energy, a small error is a large ratio (Altair, Radioss FAQ on the energy error).
+# The ratio is used while its reference exceeds this share of its peak; then 10 % are 1 % of the peak or more.
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
@@ -51,19 +52,19 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# Criteria of a run that blew up: within 5 % of the record its kinetic energy exceeds all earlier energy by 9 orders of
-# magnitude, the internal energy times 1e6 is still smaller, and the internal energy grows by a factor of 1000. A load
-# on a body at rest deforms it while moving it; a velocity given to the whole body does not deform it.
+# Criteria of a run that diverged: within 5 % of the record its kinetic energy exceeds all earlier energies by 1e9,
+# the internal energy is still below 1e-6 of it, and the internal energy grows by a factor of 1000.
+# A load on a body at rest deforms and moves it; a velocity given to the whole body does not deform it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# Number of earlier states with energy that are needed: the first states of a body at rest contain round-off or 0.
+# Fewest earlier states with energy: the first states of a body at rest contain round-off or 0.
 _FEWEST: Final = 12
-# Energies below this are none in any unit: those of LS-DYNA start at 2e-20 per process.
+# Energies below this value are zero in any unit: those of LS-DYNA start at 2e-20 per process.
 _NOTHING: Final = 1e-20
 
 
 class Health(NamedTuple):
-    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if not written.
+    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if unknown.
 
     Shares refer to the peak internal energy of the model; ``part_hourglass_share`` to that of ``part``, the worst of
     the chosen parts.  The energy ratio is the total energy over the initial energy and the external work.  The last
@@ -110,7 +111,7 @@ def assess_health(
     peak = _find_peak(balance)
     if balance.internal is not None and peak is None:
         reason = (
-            "the internal energy never exceeds a millionth of the energy of the run, so "
+            "the internal energy never exceeds 1e-6 of the energy of the run, so "
             "shares of it are meaningless"
         )
         return Health(
@@ -134,7 +135,7 @@ def assess_health(
 
 
 def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | None:
-    """Return a message if the window has too few states to distinguish a load from gravity, else None."""
+    """Return a message if the window has too few states to distinguish a load from gravity, otherwise None."""
     states = int(
         np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
     )
@@ -167,7 +168,10 @@ def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     listings = list(find_wrong_energies(sources))
     if listings:
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
-        text = f"{listings[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        text = (
+            f"{listings[0]}: {why} in a restart (its pull request 4538); run the reference again with a "
+            "newer version"
+        )
         yield Caution(WRONG_ENERGY, text)
 
 
@@ -200,19 +204,20 @@ _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("negative-sliding", lambda h: _is_above(h.negative_sliding_share, MOST_NEGATIVE_SLIDING),
      "contact energy falls to -{h.negative_sliding_share:.0%} of the internal energy{up_to}: check for penetrations"),
     ("sliding", lambda h: _is_above(h.sliding_share, MOST_SLIDING),
-     "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; only friction can explain that"),
+     "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; check whether friction explains it"),
     ("eroded-energy", lambda h: _is_above(h.eroded_share, MOST_WORK),
-     ("deleted elements hold {h.eroded_share:.0%} of the internal energy{up_to}: it counts as internal energy of the "
-     "model but does not spring back")),
+     ("eroded elements contain {h.eroded_share:.0%} of the internal energy{up_to}: it is part of the "
+      "internal energy of "
+     "the model, but does not spring back after td")),
     ("window-not-judged", lambda h: h.window_reason is not None, "{h.window_reason}"),
     ("contact-in-window", lambda h: _is_above(h.window_sliding, MOST_WORK),
-     ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: where the parts touch "
-     "something, they do not fly freely")),
+     ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: parts in contact do not "
+     "fly freely")),
     ("work-in-window", lambda h: _is_above(h.window_work, MOST_WORK),
-     ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: where it acts on the "
-     "parts, they do not fly freely")),
+     ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: parts on which it acts "
+     "do not fly freely")),
     ("erosion", lambda h: _is_above(h.window_eroded, 0.0),
-     "elements are eroded {where}; elements of rigid parts would not be"),
+     "elements are eroded {where}; rigid parts lose no elements"),
 )  # fmt: skip
 
 
@@ -228,14 +233,14 @@ def _find_peak(balance: Balance) -> float | None:
 
 
 def _compute_share(energy: Samples | None, peak: float | None) -> float | None:
-    """Return the highest value over the peak of the internal energy [-], 0 if it is never positive."""
+    """Return the highest value relative to the peak of the internal energy [-]; 0 if it is never positive."""
     if energy is None or peak is None:
         return None
     return max(0.0, float(energy.max())) / peak
 
 
 def _subtract_friction(balance: Balance) -> Samples | None:
-    """Return the contact energy minus the frictional part, if that is known."""
+    """Return the contact energy minus its frictional part, if that is known."""
     if balance.sliding is None or balance.friction is None:
         return balance.sliding
     return balance.sliding - balance.friction
@@ -286,7 +291,7 @@ def _find_ratio_range(balance: Balance) -> dict[str, Any]:
 
 
 def _compute_total(balance: Balance) -> Samples | None:
-    """Return the total energy of the solver, else the sum of all terms; None if a main term is unknown."""
+    """Return the total energy written by the solver, or the sum of all terms; None if a main term is unknown."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
@@ -317,7 +322,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # printed digits
+            # half a unit of the printed digits
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
@@ -333,7 +338,7 @@ def refuse_unsound(
     *,
     choosing: bool = True,
 ) -> None:
-    """Raise RangeError if no number of the run can be used, or a given time seems to have another unit.
+    """Raise RangeError if the run cannot be used at all, or a given time seems to have another unit.
 
     With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
     and end of the flight in the settings.
@@ -358,7 +363,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
     if highest > LARGEST_ENERGY:
         yield Caution(
             "energy-too-large",
-            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected",
+            f"energies up to {highest:g}, at most {LARGEST_ENERGY:g} was expected; write them in a larger unit",
         )
         return
     reason = _describe_divergence(history)
@@ -400,8 +405,8 @@ def _describe_divergence(history: History) -> str | None:
     if not gained[state]:
         return None
     return (
-        f"the run blew up: from {earlier_energy[state]:.3g} before, its energy reaches {kinetic[state]:.3g} "
-        f"at {time[state]:.6g}; nothing in it can be trusted"
+        f"the run is unstable: its energy grows from {earlier_energy[state]:.3g} to {kinetic[state]:.3g} "
+        f"at {time[state]:.6g}; repair the model and run it again"
     )
 
 

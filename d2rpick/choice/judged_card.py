@@ -123,7 +123,9 @@ def print_judged_card(
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
     """Return the windows of switches by force, narrowed to output states, as they are judged."""
-    from d2rpick.flight.contact_times import narrow_to_states  # as above
+    from d2rpick.flight.contact_times import (
+        narrow_to_states,
+    )  # imported here: other cards do not need it
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)
     return tuple((tr, td) for tr, td in narrowed if td is not None)
@@ -135,9 +137,9 @@ def _list_card_remarks(
     """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
-        yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
+        yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
-        yield "The level is that of the whole model, whatever parts are switched."
+        yield "The internal energy is that of the whole model, not of the switched parts alone."
     for verdict in verdicts:
         if len(verdicts) > 1:
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
@@ -162,12 +164,12 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # no level to match, as the warning states
+    if verdict.situation.at_rest:  # there is no level to match, as the warning says
         return
     measures = [
         f"{name} {value:.3f}"
         for name, value in (
-            ("lock-in error", candidate.lock_in_error),
+            ("frozen-deformation error", candidate.lock_in_error),
             ("level error", candidate.level_error),
             ("kinetic fraction", verdict.situation.kinetic_share),
             ("residual", candidate.residual),

@@ -113,14 +113,14 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     tolerance: float = make_option(
-        "Largest lock-in error, or level error if no oscillator describes the record.",
+        "Largest frozen-deformation error, or level error if no oscillator describes the record.",
         FRACTION,
         "L",
         default=0.2,
         metadata=_describe_use(of_cards=True),
     )
     max_kinetic_share: float | None = make_option(
-        "Reject a td with a larger kinetic share.",
+        "Reject a td with a larger kinetic fraction.",
         NOT_NEGATIVE,
         "K",
         metadata=_describe_use(limit=Limit("kinetic_share"), of_cards=True),
@@ -157,7 +157,7 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True, of_sets=False),
     )
     cost_share: float | None = make_option(
-        "Share of the cost of a time step that the elements of the switched parts take, to predict the run time.",
+        "Share of the cost of a time step that the elements of the switched parts take, to predict the CPU time.",
         FRACTION,
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),

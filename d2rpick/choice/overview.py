@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Output that contains the momenta of parts.
+# Output of Radioss with part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
@@ -61,7 +61,7 @@ class PartOverview(NamedTuple):
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall by name, and the times (start, end) in which it ``acts`` [time]."""
+    """A contact or rigid wall by name, and the intervals (start, end) in which it ``acts`` [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
@@ -120,26 +120,28 @@ class Overview(NamedTuple):
         if self.unjudged:
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
-            return "no free flight is seen, so nothing can be made rigid"
+            return "no free flight is found, so nothing can be made rigid"
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
 
     @property
     def _doubts(self) -> list[str]:
-        """Reasons why a run with flights is not good."""
+        """Reasons why a run with flights is only usable with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
-            doubts.append("the files end within a state")
+            doubts.append(
+                "the files end within a state; read them again when the run has ended"
+            )
         if all(source == "energy" for source, _ in self.flights):
             doubts.append(
-                "only the internal energy shows the flights, which is not certain"
+                "the flights are known from the internal energy alone, which is not certain"
             )
         return doubts
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """Warnings about the health of the run and its engine, and reasons why it cannot be judged."""
+        """Warnings about the health of the run and its engine, and the reasons why it cannot be judged."""
         health = warn_about_health(self.health) if self.health else ()
         return (*self.alarms, *health, *warn_about_engine(self.source))
 
@@ -154,16 +156,14 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
 def _describe_health(health: Health | None) -> str:
     """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
-        return (
-            "the files do not hold the energy balance that shows whether a run is sound"
-        )
-    return "energies within the limits of practice"
+        return "the files do not contain the energy balance that shows whether a run is sound"
+    return "energies are within their usual limits"
 
 
 def describe_run(
     run: OpenedRun, selection: Selection, deck: str | None = None
 ) -> Overview:
-    """Describe all databases of a run; ``selection`` and ``deck`` matter for the flights."""
+    """Describe all databases of a run; ``selection`` and ``deck`` affect the flights."""
     deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
         run, deck_warnings = _apply_deck(run, deck)
@@ -263,7 +263,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
     """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
-    # imported here: few runs are given with a deck
+    # imported here: few runs have a deck
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
         check_model_of_deck,
@@ -279,7 +279,7 @@ def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ..
 
 
 def _name_missing_output(run: OpenedRun) -> str:
-    """Name the output of the solver that contains the momenta of parts, which these files lack."""
+    """Name the solver output with part momenta that these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         output = _RADIOSS
@@ -293,7 +293,7 @@ def _name_missing_output(run: OpenedRun) -> str:
                 ", at least columns x_momentum, y_momentum, z_momentum of the model"
             )
         output = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
-    return f"{output}: only momenta of the parts show for sure when they fly"
+    return f"{output}: only part momenta show for certain when the parts fly"
 
 
 def _read_notes(database: Legs) -> tuple[str, ...]:
@@ -310,7 +310,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
         energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
-    if energies is None:  # some parts come and go, so their columns have gaps
+    if energies is None:  # a part is missing in some states, so its column has gaps
         return (
             PartOverview(part, _find_highest_energy_of_part(run, part))
             for part in run.parts
@@ -327,7 +327,7 @@ def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
 
 
 def _find_maximum(energies: Samples) -> float | None:
-    """Return the highest of some energies; None without any."""
+    """Return the largest energy; None if there are none."""
     return float(energies.max()) if energies.size else None
 
 
@@ -335,7 +335,7 @@ def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some windows."""
     if rigid:
         when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
-        effect = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
+        effect = "part data and internal energy mean nothing there and are not used for the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
 
 
@@ -357,7 +357,7 @@ def _assess_health_of_run(
             states &= (balance.time < start) | (balance.time > end)
         if not states.any():
             return Health(
-                reason="its legs are rigid: energies mean nothing there",
+                reason="all of the run is rigid, so its energies mean nothing",
                 until=float(balance.time[-1]),
             )
         return assess_health(
@@ -373,7 +373,7 @@ def _assess_health_of_run(
 
 
 def _read_history(run: OpenedRun, selection: Selection) -> History | None:
-    """Return the history that would be judged; None if an energy has to be chosen first, or there is no state."""
+    """Return the history to be judged; None if the user has to choose an energy, or there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
@@ -385,7 +385,7 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
 def _warn_about_missing_energy(
     run: OpenedRun, selection: Selection
 ) -> Iterator[Caution]:
-    """Yield a warning if no internal energy can be read: one has to be chosen first, or there is none."""
+    """Yield a warning if the user has to choose an internal energy, or there is none."""
     try:
         run.history(selection)
     except FormatError as error:
@@ -395,7 +395,7 @@ def _warn_about_missing_energy(
 def _find_flights_to_choose_from(
     history: History,
 ) -> tuple[tuple[str, FreeFlight], ...]:
-    """Return the flights that ``plan`` and ``suggest`` choose from; empty if they refuse the run."""
+    """Return the flights from which ``plan`` and ``suggest`` choose; empty if they refuse the run."""
     try:
         settings = Settings()
         refuse_unsound(history, settings)

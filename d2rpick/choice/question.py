@@ -1,4 +1,4 @@
-"""Define a question: a run, the energy of it that is meant, and the settings for the choice."""
+"""Define a question: a run, its selected energy, and the settings for the choice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DEFAULT = Selection()
 
 
 class Reference(NamedTuple):
-    """A reference run, and the energy of it that a choice is about."""
+    """A reference run, and its selected energy."""
 
     run: OpenedRun
     history: History
@@ -35,7 +35,7 @@ class Reference(NamedTuple):
     def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the selected energy of an open run; FormatError if it is missing."""
         if selection.parts:
-            # imported here: a table has no parts
+            # imported here: tables have no parts
             from d2rpick.flight.momentum import (
                 replace_words_by_part_ids,
             )
@@ -44,7 +44,7 @@ class Reference(NamedTuple):
         return cls(run, run.history(selection))
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the same parts from another run of the model, whatever names they were requested by."""
+        """Read the same parts from another run of the model, regardless of the names in the request."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)

@@ -20,8 +20,8 @@ from d2rpick.base.errors import format_in_one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-# Module and one-line summary of each command, for the help, which does not import these modules: commands for one run,
-# for many runs and for decks, and commands that compute runs.
+# Module and one-line summary of each command, for the help, which does not import these modules.
+# Commands for one run come first, then those for many runs and decks, then those that compute runs.
 _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
     "drive": ("running", "Compute a Radioss run that switches itself."),
@@ -96,7 +96,7 @@ class Documented(click.Command):
         """Write the examples, no wider than the help."""
         from d2rpick.report.tables import (
             wrap_command,
-        )  # imported here since most commands do not need it
+        )  # imported here: most commands do not need it
 
         lines = [
             wrap_command(f"  {line}", formatter.width)
@@ -148,7 +148,9 @@ class _CommandGroup(Documented, click.Group):
         if not args and not ctx.resilient_parsing:
             click.echo(ctx.get_help(), err=True)
             ctx.exit(COULD_NOT_RUN)
-        ctx.meta["d2rpick.command"] = tuple(args)  # click consumes the list
+        ctx.meta["d2rpick.command"] = tuple(
+            args
+        )  # a copy, because click empties the list of arguments
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -183,7 +185,7 @@ class _CommandGroup(Documented, click.Group):
             stop_with_error(error.format_message())
         except OSError as error:  # raised if a help or version text cannot be written
             stop_with_error(format_in_one_line(error))
-        except click.Abort:  # click turns an interrupt into this
+        except click.Abort:  # click converts an interrupt to this
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
@@ -236,7 +238,7 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        lines = examples.replace("\\\n    ", "").split("\n")  # each command in one line
+        lines = examples.replace("\\\n    ", "").split("\n")  # each command on one line
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(
             function.__name__, cls=cls, help=help_text, epilog=epilog, **settings

@@ -77,7 +77,9 @@ def card(
     output.notes(history_notes, collect_cautions(judged_card))
     output.notes(judged_card.card.notes, ())
     output.content(encode_text(judged_card.card.text))
-    output.finish(objection=not judged_card.passed)
+    if judged_card.worst:
+        settings = judged_card.verdicts[0].situation.settings
+        output.finish_by_verdict(judged_card.worst, settings.min_quality)
 
 
 def _read_windows(

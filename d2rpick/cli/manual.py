@@ -41,7 +41,7 @@ def write_manual() -> str:
     lines += [
         ".SH EXIT STATUS",
         *_write_item("0", "done"),
-        *_write_item("1", "ran, and the answer is an objection"),
+        *_write_item("1", "ran, and found a problem"),
     ]
     lines += [
         *_write_item(

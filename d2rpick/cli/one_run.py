@@ -154,9 +154,6 @@ def suggest(
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
     answer = suggest_for_question(question, wanted)
-    # a given td is answered, however poor it is
-    min_grade = request.min_quality or ("poor" if td is not None else "fair")
-    passed = answer.decision is not None and answer.decision.reaches(min_grade)
     new_cautions = [
         caution
         for caution in answer.cautions
@@ -176,11 +173,13 @@ def suggest(
                 for caution in collect_cautions(judged_card)
                 if caution not in answer.cautions
             ]
-        return output.finish(
-            objection=not (output.card(judged_card, new_cautions) and passed),
-        )
+        output.card(judged_card, new_cautions)
+        decision = judged_card.worst if judged_card else None
+        return output.finish_by_verdict(decision, question.settings.min_quality)
     output.answer(answer)
-    return output.finish(objection=not passed)
+    # a given td is answered, however poor it is; only a card must not be used unseen
+    min_quality = request.min_quality or ("poor" if td is not None else "fair")
+    return output.finish_by_verdict(answer.decision, min_quality)
 
 
 @options.make_command
@@ -245,9 +244,8 @@ def explore(
     )
     output.answer(answer)
     chosen = answer.recommended
-    min_grade = question.settings.min_quality
-    passed = chosen and chosen.decision and chosen.decision.reaches(min_grade)
-    output.finish(objection=not passed)
+    decision = chosen.decision if chosen else None
+    output.finish_by_verdict(decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -266,7 +264,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Lowest ratio of the mean energy after td to the reference's; the highest is as far above 1.",
+        "Lowest allowed ratio of the mean energy after td to that of the reference run; the highest is as far above 1.",
         FRACTION,
         "E",
     ),
@@ -308,7 +306,7 @@ def verify(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish(objection=not answer.decision.reaches(question.settings.min_quality))
+    output.finish_by_verdict(answer.decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -340,7 +338,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     """List which parts of a run may be switched, and what sets of parts save.
 
     Each part is listed with its elements, material, mass and energy, and a verdict with its reasons.  Sets of parts
-    follow with the processor time that they save, and the recommended set.  --part adds a set to the comparison.
+    follow with the CPU time that they save, and the recommended set.  --part adds a set to the comparison.
 
     Examples
     --------
@@ -417,7 +415,7 @@ def plan(
 ) -> None:
     """Plan the rigid windows of a run: tr and td of each flight, and whether HISTORY supports them.
 
-    HISTORY supports the windows up to and including the first that locks in energy, which moves the later landings.
+    HISTORY supports the windows up to and including the first that freezes vibration energy: it shifts later landings.
     Run with these windows, then plan the next ones from the switched run, with --done.
 
     Examples

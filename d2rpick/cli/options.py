@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # a command function; click's decorators have no closer type
+Decorated = Any  # a command function; click's decorators have no narrower type
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
@@ -64,7 +64,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 }
 # Placeholders of options that are times of the run.
 _TIMES: Final = ("T", "LO HI")
-# Options that write files, which would already exist when the command is repeated.
+# Options that write files, which would already exist if the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -125,12 +125,12 @@ class Command(Documented):
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(encode_text("\n".join(_list_settings(ctx))))
         if (words := list_words(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # imported here to keep the start fast
+            import shlex  # imported here to start faster
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
-        # Import numpy before the modules of a run: its import makes many nested calls, and each may meet the end of a
-        # piece of the stack of Python 3.11, which then maps memory for it and unmaps it again.
+        # Import numpy before the modules of a run: its import makes many nested calls.
+        # Each call may reach the end of a piece of the stack of Python 3.11, which then maps and unmaps memory.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401
         try:
@@ -358,7 +358,7 @@ def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -
     ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
-# Options that every command accepts but none uses itself: they are kept in the context.
+# Options that every command accepts but none uses itself; they are kept in the context.
 _FLAGS: Final = [
     _share_option(
         click.option(

@@ -7,7 +7,7 @@ import re
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final, Protocol, TextIO
 
 import click
 
@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# a narrower terminal is treated as if tables were never read there [columns]
+# narrower terminals are ignored [columns]
 _NARROWEST: Final = 40
 # formats implied by file names
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # formats often expected of a report, but not supported
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Lines of a result that are bold: what is recommended or judged, and what is to be changed in a deck.
+# Lines of a result in bold: recommendations, verdicts, and changes of a deck.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 
 
-# Arguments that messages name in backticks, with the options that set them if these have other names.
+# Arguments that messages name in backticks, with their options if these have other names.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -73,12 +73,27 @@ _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {
     "table",
     "markdown",
-}  # forms whose answer itself says why nothing is recommended
+}  # forms whose answer itself explains why nothing is recommended
+
+
+class Verdict(Protocol):
+    """Verdict on a pair of times, on which the exit code rests."""
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words."""
+
+    @property
+    def grade(self) -> str:
+        """Grade of the pair."""
+
+    def reaches(self, grade: str) -> bool:
+        """Return True if the pair has at least the given grade."""
 
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Writes results to stdout or a file, and all else to stderr unless ``quiet``; ``inputs`` are never overwritten."""
+    """Writes results to stdout or a file, and everything else to stderr; ``inputs`` are never overwritten."""
 
     plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -196,6 +211,18 @@ class Output:
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
+    def finish_by_verdict(self, decision: Verdict | None, min_quality: str) -> None:
+        """Exit with 1 if there is no pair, or if its grade is below ``min_quality``, which is then named."""
+        if decision is None or decision.reaches(min_quality):
+            self.finish(objection=decision is None)
+            return
+        if not self.exit_zero:
+            verdict = f"the verdict is {decision.verdict!r} (grade {decision.grade})"
+            tell(
+                f"d2rpick: exit code {OBJECTION}: {verdict}; --min-quality {decision.grade} accepts it"
+            )
+        self.finish(objection=True)
+
     def spare(self, inputs: Iterable[str]) -> None:
         """Raise D2RPickError if a file would replace one of further inputs, which are known only after reading."""
         further = replace(self, inputs=tuple(inputs))
@@ -205,7 +232,7 @@ class Output:
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError if ``name`` cannot be written, is an input, or exists and must not be replaced."""
-        from pathlib import Path  # imported here since --help does not need it
+        from pathlib import Path  # imported here: --help does not need it
 
         path = Path(name)
         if path.is_dir():
@@ -261,7 +288,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print what a reader left out, and the warnings."""
+        """Print the omissions of a reader, and the warnings."""
         if self.quiet:
             return
         for note in notes:
@@ -339,14 +366,14 @@ def tell(message: str) -> None:
     if is_on_terminal() and (width := measure_columns(sys.stderr)):
         from d2rpick.report.tables import (
             wrap_lines,
-        )  # imported here since --help does not need it
+        )  # imported here: --help does not need it
 
         text = wrap_lines(text, width)
     click.echo(text, err=True)
 
 
 def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
-    """Return any error as one line with the options of the command line; ``--debug`` prints its traceback first.
+    """Return any error as one line, which names options instead of arguments; ``--debug`` prints its traceback.
 
     An unforeseen error names no input, so that ``inputs`` are added.
     """
@@ -403,7 +430,7 @@ def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
         return text
     from d2rpick.report.tables import (
         wrap_lines,
-    )  # imported here since --help does not need it
+    )  # imported here: --help does not need it
 
     return wrap_lines(text, width)
 

@@ -22,7 +22,7 @@ _PERIOD: Final = 1.0  # time before the first line, and between two lines [s]
 def show_reading(
     names: Sequence[str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Show on a terminal for how many seconds ``names`` have been read, unless ``quiet``.
+    """Show on a terminal how many seconds the reading of ``names`` has taken, unless ``quiet``.
 
     ``period`` is the time before the first line, and between two lines [s].  The remaining time is unknown: how much of
     a file must be read depends on the question.
@@ -50,7 +50,7 @@ class Count:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Set the number of finished runs; the first call gives the number that needed no computation."""
+        """Set the number of finished runs; the first call sets the number that needed no computation."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
@@ -103,7 +103,7 @@ def show_progress(
     if quiet or not is_on_terminal():
         yield
         return
-    from threading import Event, Thread  # imported here since --help does not need it
+    from threading import Event, Thread  # imported here: --help does not need it
 
     done = Event()
     thread = Thread(target=_tell, args=(say, done, period), daemon=True)

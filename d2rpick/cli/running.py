@@ -135,7 +135,7 @@ def _plan(driving: Driving) -> list[str]:
     return [
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
-        f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
+        f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further engine runs",
         *(
             [f"missing   {missing}: no such program"]
             if (missing := commands.missing())

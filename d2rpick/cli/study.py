@@ -179,14 +179,14 @@ def _read_list(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # Not splitlines(): a name may contain its other line separators.
+    # Not splitlines(): names may contain its other line separators.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
-    """Raise D2RPickError if a result, ``written`` by its option, would overwrite the file of ``--resume``."""
+    """Raise D2RPickError if a result (``written`` by its option) would overwrite the file of ``--resume``."""
     if name is None:
         return
     for option, file in written.items():
@@ -232,7 +232,7 @@ def _choose_farm(
 )
 @options.add_options(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
-    """Fit the cost of elements to the processor times of your runs, for --weights.
+    """Fit the cost of elements to the CPU times of your runs, for --weights.
 
     Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
     Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  Costs that the runs

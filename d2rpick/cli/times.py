@@ -1,4 +1,4 @@
-"""Options that are times of a run: numbers in its unit, or texts with a unit until the unit of the run is known."""
+"""Define options that are times of a run: numbers in its unit, or texts with a unit until that unit is known."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.request import Request
 
-# Commands whose runs are computed here, in SI units.
+# Commands that compute runs in SI units.
 _IN_SECONDS = ("rollover",)
-# Arguments that name the files of one run, and of many.
+# Arguments with the files of one run, and of many.
 _ONE_RUN = "history"
 _MANY_RUNS = "run"
-# Options that choose the column of time and the format.
+# Options that choose the time column and the format.
 _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
@@ -29,7 +29,7 @@ class TimeType(NumberType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Read a number; leave a time with a unit as it was typed."""
+        """Read a number; keep a time with a unit as it was typed."""
         if isinstance(value, str) and value.strip()[-1:].isalpha():
             from d2rpick.api.times import is_time_with_unit
 
@@ -85,7 +85,7 @@ def _convert(
 
 
 def _find_unit(ctx: click.Context) -> tuple[str, str]:
-    """Return the unit of the run of a command, empty if it is not known, and what should name it."""
+    """Return the time unit of the run of a command, empty if it is unknown, and the source that should name it."""
     if ctx.command.name in _IN_SECONDS:
         return "s", ""
     runs = _list_runs(ctx)
@@ -115,7 +115,7 @@ def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
 
 
 def _make_reading_request(ctx: click.Context) -> Request:
-    """Return how the command line says to read files."""
+    """Return the reading options of the command line as a request."""
     from d2rpick.api.request import Request
 
     return Request(

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # generic since click 8.4
+    FloatType = click.ParamType  # generic from click 8.4 on
 
 CARDS: Final = tuple(list_options(Cards))
-# Options that apply only together with one of others: settings are for all commands, even those that lack these.
+# Options that apply only together with another one: settings are for all commands, also those that lack these.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -103,7 +103,32 @@ class Program(click.types.StringParamType):
     """A command to be started, or the address of a computing cluster: a settings file must not set either."""
 
 
-class Names(click.types.StringParamType):
+class CompletedText(click.types.StringParamType):
+    """Text that the shell completes from a list of names."""
+
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the names to choose from, each with a description."""
+        return ()
+
+    def shell_complete(
+        self,
+        ctx: click.Context,
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Offer the names with this prefix, without those that a shell would split."""
+        import re
+
+        from click.shell_completion import CompletionItem
+
+        return [
+            CompletionItem(name, help=description)
+            for name, description in self.offer(ctx)
+            if name.startswith(incomplete) and re.fullmatch(r"[\w./-]+", name)
+        ]
+
+
+class Names(CompletedText):
     """Names, separated by semicolons in an environment variable, since labels may contain blanks."""
 
     envvar_list_splitter = ";"
@@ -112,64 +137,49 @@ class Names(click.types.StringParamType):
 class PartNames(Names):
     """Ids and titles of parts, completed from the history on the command line."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the parts of the files on the command line, and the words for several parts."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
+        """Return the parts of the files on the command line, and the words for several parts."""
         run = _open_typed_run(ctx)
         parts = run.parts if run else ()
         words = [
             ("flying", "parts that fly together"),
             ("all", "every part that has energy"),
         ]
-        offered = [
+        return [
             *((str(part.id), part.title) for part in parts),
-            *((p.title, str(p.id)) for p in parts),
+            *((part.title, str(part.id)) for part in parts),
             *words,
         ]
-        return _complete_names(offered, incomplete)
 
 
-class RuleIds(click.types.StringParamType):
+class RuleIds(CompletedText):
     """Ids of the rules of check."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the rules with this prefix and their summaries."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the rules with their summaries."""
         from d2rpick.report.findings import list_rules
 
         rows = (line.split(maxsplit=2) for line in list_rules().split("\n"))
-        return _complete_names(
-            [(id_, summary) for id_, _, summary in rows], incomplete.upper()
-        )
+        return [(rule, summary) for rule, _, summary in rows]
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the rules with this prefix in any case."""
+        return super().shell_complete(ctx, param, incomplete.upper())
 
 
 class ChannelNames(Names):
     """Names of channels, completed from the history on the command line."""
 
-    def shell_complete(
-        self,
-        ctx: click.Context,
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the channels of the files on the command line, with underscores for blanks, which are equivalent."""
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
+        """Return the channels of the files on the command line, with underscores for blanks, which are equivalent."""
         run = _open_typed_run(ctx)
-        return _complete_names(
-            [(name.replace(" ", "_"), "") for name in (run.channels if run else ())],
-            incomplete,
-        )
+        return [(name.replace(" ", "_"), "") for name in (run.channels if run else ())]
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
-    """Open the files on the command line; return None if they are no run."""
+    """Open the files on the command line; None if they are not a run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -184,27 +194,7 @@ def _open_typed_run(ctx: click.Context) -> Run | None:
         return None
 
 
-def _complete_names(
-    offered: Iterable[tuple[str, str]], incomplete: str
-) -> list[CompletionItem]:
-    """Return the names with this prefix, without those that a shell would split."""
-    import re
-
-    from click.shell_completion import CompletionItem
-
-    words = [
-        (name, help_text)
-        for name, help_text in offered
-        if re.fullmatch(r"[\w./-]+", name)
-    ]
-    return [
-        CompletionItem(name, help=help_text)
-        for name, help_text in words
-        if name.startswith(incomplete)
-    ]
-
-
-class SolverName(click.types.StringParamType):
+class SolverName(CompletedText):
     """Name of a solver whose input can be printed; the table of solvers is imported only when it is needed."""
 
     name = "solver"
@@ -225,14 +215,9 @@ class SolverName(click.types.StringParamType):
         """Return the names for the help."""
         return f"[{'|'.join(list_solvers())}]"
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
-        """Offer the names with this prefix."""
-        return _complete_names([(name, "") for name in list_solvers()], incomplete)
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+        """Return the names of the solvers."""
+        return [(name, "") for name in list_solvers()]
 
 
 _NAMED: Final = {
@@ -343,7 +328,7 @@ def _read_value(
         raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
         return converted
-    from pathlib import Path  # imported here since settings rarely contain a file
+    from pathlib import Path  # imported here: settings rarely contain a file
 
     folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
     if has_list:
@@ -357,7 +342,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
         reason = "programs, output files and overwrite are never taken from a file"
     elif (
         not option.expose_value
-    ):  # --help, --debug and others that concern a single call
+    ):  # options that concern a single call, such as --help and --debug
         reason = "this is never taken from a file"
     else:
         return

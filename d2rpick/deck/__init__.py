@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
-# Bytes at the beginning of a file that identify a deck: titles and comments may come before the keyword.
+# Bytes at the start of a file that identify a deck, as titles and comments may precede the keyword.
 _HEAD = 64 * 1024
 
 
@@ -101,7 +101,7 @@ def find_decks_of_run(folder: str) -> list[str]:
 
 def _has_parts(path: str) -> bool:
     """Return True if a deck has parts, or cannot be read."""
-    from d2rpick.deck import radioss_files  # not above: start-up
+    from d2rpick.deck import radioss_files  # imported here to start faster
 
     try:
         if radioss_files.list_run_files(path):
@@ -114,12 +114,12 @@ def _has_parts(path: str) -> bool:
 
         return bool(read_parts(read_deck(path)).materials)
     except DeckError:
-        return True  # whoever reads the deck reports the error
+        return True  # the reader of the deck reports the error
 
 
 def _list_includes(path: str) -> list[str]:
     """Return the names of the files that a deck includes; none if it cannot be read, which the check reports."""
-    from d2rpick.deck import radioss_files, reader  # not above: start-up
+    from d2rpick.deck import radioss_files, reader  # imported here to start faster
 
     try:
         if radioss_files.list_run_files(path):
@@ -133,7 +133,7 @@ def _list_includes(path: str) -> list[str]:
 
 def _list_files(folder: str) -> Iterator[str]:
     """Yield the paths of all visible files in a folder and its subfolders."""
-    from pathlib import Path  # not above: start-up
+    from pathlib import Path  # imported here to start faster
 
     for root, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))

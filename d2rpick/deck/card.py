@@ -35,23 +35,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import Block
 
 
-STANDARD, LONG = 10, 20  # columns of a field
+STANDARD, LONG = 10, 20  # width of a field in standard and in long format [characters]
 # Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled on use.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled at first use
 _PARAMETERS: Final = [*PARAMETERS]
 _FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
 
 class CardField(NamedTuple):
-    """The text of one field without surrounding blanks, and its place: the column is counted from 1."""
+    """The text of one field without surrounding blanks, and its position; the column is counted from 1."""
 
     text: str
     block: Block
-    distance: int  # lines below the keyword
+    distance: int  # number of lines below the keyword
     column: int
 
     @property
@@ -125,7 +125,7 @@ class Row:
         return CardField(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
-        """Return the text of a field; all texts of the line are cached, as callers read them one after the other."""
+        """Return the text of a field; all texts of the line are cached, as callers read one field after the other."""
         cells = self._cells
         if cells is None:
             cells = self._cells = [*map(str.strip, self._pieces())]
@@ -141,7 +141,7 @@ class Row:
 
 
 class Transform(NamedTuple):
-    """What ``*INCLUDE_TRANSFORM`` does to a file: the offsets of its ids and the factor of its times.
+    """Effects of ``*INCLUDE_TRANSFORM`` on a file: the offsets of its ids and the factor of its times.
 
     ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
     """
@@ -304,7 +304,7 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """The parameters that are visible in one file: its local ones, those of the including files, then the global ones.
+    """The parameters visible in one file: first local ones, then those of the including files, then global ones.
 
     If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
     warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
@@ -318,7 +318,7 @@ class Scope:
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        # Number of definitions read before a card: later ones do not apply to it.
+        # Number of definitions read before a card; later definitions do not apply to it.
         self._known: float = math.inf
         self._seen = self
 

@@ -1,4 +1,4 @@
-"""Describe data lines by their columns, each declared once with name, type and width, to read and to write them.
+"""Describe data lines by columns, each declared once with name, type and width, to read and to write them.
 
 The lines of LS-DYNA keywords are declared in `ls_dyna_columns`, those of Radioss blocks in `radioss_columns`.
 """

@@ -124,7 +124,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Return the least wait that gives as many windows as planned, none of which begins before its planned time."""
+    """Return the shortest wait that gives as many windows as planned, with none before its planned start."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
@@ -138,7 +138,8 @@ def _find_least_wait(
     achieved = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in switched) or "none"
     planned = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in windows)
     raise DeckError(
-        f"no wait lets a {what} switch in the planned windows ({planned}): its windows would be {achieved}; plan one"
+        f"no force-free time lets a {what} switch in the planned windows ({planned}): its windows "
+        f"would be {achieved}; plan one"
         " window for each flight, or switch by time"
     )
 

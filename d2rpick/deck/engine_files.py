@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Least number of time steps in a rigid window: the release is at most one step late.  Each window has its own limit,
-# so that further windows do not change the run before them.
+# Least number of time steps in a rigid window: the release is at most one step late.
+# Each window has its own limit, so that later windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
 _MOST_LEGS = 99  # the names of time histories have two digits for the engine run
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end [time], and its largest time step while bodies are rigid (None if none is)."""
+    """An engine run: its number, its end [time], and its largest time step while bodies are rigid, or None."""
 
     number: int
     stop: float
@@ -35,7 +35,7 @@ def choose_step_cap(tr: float, td: float) -> float:
 def plan_legs(
     windows: Sequence[Times], end: float, step_cap: float | None
 ) -> list[EngineFile]:
-    """Return the engine runs for some windows up to ``end``; a window that begins at 0 needs no run before it.
+    """Return the engine runs for rigid windows up to ``end``; a window that begins at 0 needs no run before it.
 
     Raises
     ------

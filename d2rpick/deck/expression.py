@@ -20,11 +20,11 @@ Number = int | float
 _NUMBER = re.compile(
     r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII
 )
-_TOKEN: Final = (  # compiled on use
+_TOKEN: Final = (  # compiled at first use
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
-REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # compiled on use
-# Levels of nested parentheses: no deck needs more, and the recursion must not exhaust the stack of Python.
+REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # compiled at first use
+# Levels of nested parentheses: no deck needs more, and the recursion must not exhaust Python's stack.
 _DEEPEST = 50
 LONGEST = 40  # characters: a longer text is not a number
 _LONGEST_EXPRESSION = 2000

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    Spans = Sequence[tuple[float, float]]  # of time
+    Spans = Sequence[tuple[float, float]]  # spans of time
 
 
 class ForceSwitch(NamedTuple):
@@ -81,7 +81,7 @@ def _follow_switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which the sets act in turn, and True if they make parts rigid; each sees its own contacts."""
+    """Yield the times at which the sets act in turn, and True if they make parts rigid."""
     ready = 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
@@ -111,7 +111,7 @@ def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
 def find_delay_without_chatter(
     windows: Sequence[tuple[float, float]], contacts: Spans
 ) -> float | None:
-    """Return the least TIME3 of the set that makes parts deformable with which the pair switches only in these windows.
+    """Return the smallest TIME3 of the releasing set with which the pair switches only in these windows.
 
     Each contact before a window must be over within this time; None if no contact precedes any window.
     """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _PIECE: Final = (
     1 << 14
-)  # elements processed together: their arrays fit the processor's cache
+)  # elements processed at once, whose arrays fit into the processor's cache
 # Nodes of each face of a brick, in the order seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
@@ -290,7 +290,7 @@ class Placement:
         }
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
-        """Return the mean position (3,) of the watched nodes of some parts [length], each node once.
+        """Return the mean position (3,) of the watched nodes of given parts [length], each node once.
 
         None without any.
         """
@@ -311,7 +311,7 @@ class Placement:
         return np.asarray(self._inventory.coordinates[nodes[nodes != NO_NODE]])
 
     def hanging_together(self, parts: Collection[int]) -> frozenset[int]:
-        """Return the largest group of these parts that share nodes, directly or indirectly."""
+        """Return the largest group of these parts that are connected by shared nodes."""
         groups = self._inventory.groups(parts)
         return frozenset(max(groups, key=self._inventory.rigid_nodes, default=()))
 
@@ -334,7 +334,7 @@ def _compute_shares(
     first = np.stack(
         [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
     )
-    # Relative to the centre of the part: far from the origin digits would be lost.
+    # Relative to the centre of the part, because digits are lost far from the origin.
     x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
         np.bincount(part_index, sizes * a * b)
@@ -381,7 +381,7 @@ def _combine_shares(
         )
         / size
     )
-    # Ascending; there are many more nodes than watched ones, so these are searched in it.
+    # Ascending: the few watched nodes are searched among the many nodes.
     nodes = inventory.nodes_by_part[part]
     positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     watched_nodes = inventory.watched[nodes[positions] == inventory.watched]

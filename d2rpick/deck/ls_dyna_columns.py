@@ -118,12 +118,12 @@ def make_node_line(id_width: int, real_width: int) -> DataLine:
 
 
 def make_element_line(width: int, node_count: int) -> DataLine:
-    """Return the line of *ELEMENT with up to so many nodes, whose width depends on the format of the deck."""
+    """Return the line of *ELEMENT with this number of nodes; its width depends on the format of the deck."""
     nodes = " ".join(f"N{number}" for number in range(1, node_count + 1))
     return DataLine(integers(f"EID PID {nodes}", width))
 
 
 def make_watched_line(width: int, node_count: int) -> DataLine:
-    """Return the line of *DATABASE_HISTORY_NODE with so many nodes."""
+    """Return the line of *DATABASE_HISTORY_NODE with this number of nodes."""
     nodes = " ".join(f"ID{number}" for number in range(1, node_count + 1))
     return DataLine(integers(nodes, width))

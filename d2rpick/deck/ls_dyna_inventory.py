@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that can be read: their lines have no integers in the columns of element and part id.
+# Options of element keywords that can be read: they add no integers in the columns of element and part id.
 _OPTIONS: Final = {
     *(
         "THICKNESS",
@@ -153,7 +153,7 @@ _ELASTIC: Final = {
 
 
 class _LsDynaElementKind(NamedTuple):
-    """A kind of element: its name, and the largest and the least number of nodes of an element."""
+    """A kind of element: its name, and the largest and smallest number of nodes of an element."""
 
     name: str
     most: int
@@ -243,7 +243,7 @@ def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int,
 def find_parts_of_nodes(
     cards: Sequence[Card], nodes: Collection[int]
 ) -> dict[int, set[int]]:
-    """Return the parts whose elements contain each of some nodes, by node id."""
+    """Return the parts whose elements contain each of the given nodes, by node id."""
     parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:
@@ -260,7 +260,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield part and node id for each node of the elements of some parts, in the order of the deck."""
+    """Yield part and node id for each node of the elements of given parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
@@ -320,7 +320,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
         kind = card.name.split("_")[1:2]
         fitting = card.name.startswith(
             "ELEMENT_SEATBELT_"
-        )  # slip ring, retractor, sensor, ...
+        )  # slip ring, retractor, sensor and so on
         if (
             card.name.startswith("ELEMENT_")
             and kind
@@ -427,7 +427,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 
 
 def _read_codes(lines: Lines, fields: Layout) -> Integers:
-    """Return the last of some fields as integers; mostly 0, which needs no parsing."""
+    """Return the last of the fields as integers; mostly 0, which needs no parsing."""
     start, width = fields[-1]
     if (
         lines.in_columns

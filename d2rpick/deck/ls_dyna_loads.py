@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
 _PART_ID, _NODE_SET = 3, 4  # values of SSTYP and MSTYP
-# Further keywords that connect parts, by the beginning of their names; the connected parts are unknown.
+# Beginnings of further keywords that connect parts; the connected parts are unknown.
 _OTHER_TIES: Final = (
     *(
         "CONSTRAINED_TIED_NODES_FAILURE",
@@ -116,7 +116,7 @@ def read_ls_dyna_boundary(
 
 
 def _describe_card(card: Card) -> str:
-    """Return the keyword with its place."""
+    """Return the keyword with its file and line."""
     return f"*{card.name} ({card.at})"
 
 

@@ -52,7 +52,6 @@ _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNE
 _ROTATED = 1  # value of IRCS of *PART_INERTIA that adds a line
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
-_PER_LINE = 8
 # Node sets of each deck, cached.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
 # Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 are co-rotational.
@@ -110,7 +109,9 @@ _ABLE: Final = (
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
-_MOST_ROWS = 8  # of a contact or wall without id; more rows may define a second one
+_MOST_ROWS = (
+    8  # most rows of a contact or wall without id; more rows may define a second one
+)
 
 
 class DeckPartSet(NamedTuple):
@@ -407,7 +408,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that are searched for shared nodes, or (``searched`` False) those that cannot be."""
+    """Return the element cards that are searched for shared nodes, or (``searched`` False) the other ones."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -422,7 +423,7 @@ Kind = Literal[
 
 
 class Constraint(NamedTuple):
-    """A constraint: its kind, place, id (0 for none), nodes, and the rigid part to which it belongs."""
+    """A constraint: its kind, field, id (0 for none), nodes, and the rigid part to which it belongs."""
 
     kind: Kind
     place: CardField
@@ -432,7 +433,7 @@ class Constraint(NamedTuple):
 
 
 def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
-    """Yield the constraints of some kinds; the set of nodes is empty if they are unknown."""
+    """Yield the constraints of the given kinds; the set of nodes is empty if they are unknown."""
     for kind in kinds:
         keyword, read_card = _CONSTRAINTS[kind]
         for card in deck.named(keyword):

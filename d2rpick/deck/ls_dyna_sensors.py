@@ -1,4 +1,4 @@
-"""Follow sensors of LS-DYNA that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
+"""Follow LS-DYNA sensors that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
 
 A control is on or off. Its switches act in turn: when the condition of one is met, the control changes, and the next
 switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # of time
-    # When the force of a contact or rigid wall is above a value, by its kind and number; None where it is not known.
+    Spans = tuple[tuple[float, float], ...]  # spans of time
+    # Spans in which the force of a contact or wall exceeds a value, by its kind and number; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 
 
@@ -39,7 +39,7 @@ _ALWAYS: Final = ((0.0, math.inf),)
 
 
 class Control(NamedTuple):
-    """A *SENSOR_CONTROL that switches a set, with the ids of its switches in the order in which they act.
+    """A *SENSOR_CONTROL for a switch set, with the ids of its switches in the order in which they act.
 
     ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
     infinite.
@@ -53,7 +53,7 @@ class Control(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A control is on, or off, from ``time`` on [time of the deck]."""
+    """The state of a control, on or off, from ``time`` on [time of the deck]."""
 
     time: float
     on: bool

@@ -37,10 +37,10 @@ _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines without fixed columns
 # Last column of most ids: a line with a character there is not blank.
 _ID_ENDS: Final = 7
 _HIGHEST: Final = 10**17  # larger than any id; a longer number would overflow
-NO_NODE: Final = -1  # place of a missing node
+NO_NODE: Final = -1  # index of a missing node
 _DENSE: Final = 50_000_000  # largest id up to which a table of all ids is small enough
 NOTHING: Final = -1  # value of a field that is not an id
-# Up to so many lines all fields are parsed together, as a deck may have a card for each element.
+# Up to this number of lines all fields are parsed together, since a deck may have a card for each element.
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
@@ -123,7 +123,7 @@ class Lines:
         }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
-        """Return the texts of some fields of a line."""
+        """Return the texts of fields of a line."""
         if "," in text:
             cells = text.split(",")
             return [
@@ -228,7 +228,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 
 
 class NodeTable:
-    """Nodes of a mesh by place: those with coordinates in the order given, then those that only elements have.
+    """Nodes of a mesh by index: first those with coordinates, then those that occur in elements only.
 
     ``ids`` are the node ids by place, shape (nodes,).
 
@@ -246,7 +246,7 @@ class NodeTable:
         self._sorted = self.ids[self._order]
 
     def places(self, ids: Places) -> Places:
-        """Return the place of each node; `NO_NODE` for a node that is not in the table."""
+        """Return the index of each node; `NO_NODE` for a node that is not in the table."""
         if not self.ids.size:
             return np.full_like(ids, NO_NODE)
         if self._sorted[-1] <= _DENSE:
@@ -257,20 +257,20 @@ class NodeTable:
         return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
 
     def known(self, ids: Places) -> Places:
-        """Return the places of the nodes that are in the table."""
+        """Return the indices of the nodes that are in the table."""
         places_or_none = self.places(ids)
         return np.asarray(places_or_none[places_or_none != NO_NODE])
 
     @cached_property
     def _lookup(self) -> Places:
-        """Return the places by id, for small ids; faster than a search."""
+        """Return the indices by id, for small ids; faster than a search."""
         lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
         lookup[self._sorted[::-1]] = self._order[::-1]
         return lookup
 
 
 class Elements(NamedTuple):
-    """Elements of one kind: part ids, shape (n,), and places of their nodes in the node table, shape (n, nodes)."""
+    """Elements of one kind: part ids, shape (n,), and indices of their nodes in the table, shape (n, nodes)."""
 
     kind: str
     part: Places
@@ -337,7 +337,7 @@ class Mesh(NamedTuple):
         return kinds_by_part
 
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
-        """Yield notes on elements without a part in the deck and nodes without coordinates.
+        """Yield notes on elements of undefined parts and on nodes without coordinates.
 
         ``sign`` begins the keywords.
         """
@@ -407,7 +407,7 @@ def find_parts_with_elements(starter: Starter) -> set[int]:
 def find_parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Return for each group of nodes and parts the parts all of whose nodes belong to it."""
+    """Return, for each group of nodes and parts, the parts with all their nodes in the group."""
     elements = [*_read_element_blocks(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():

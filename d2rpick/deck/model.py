@@ -36,7 +36,7 @@ DISCRETE: Final = frozenset({SPRING, "seatbelt"})
 
 
 class Hold(NamedTuple):
-    """A support or a prescribed motion: its name, and what it holds from ``start`` to ``end`` [time].
+    """A support or a prescribed motion: its name, and its nodes and parts, held from ``start`` to ``end`` [time].
 
     ``nodes`` are node ids, or places once it is `placed`. ``parts`` are held as a whole. ``axes`` are the fixed global
     directions of translation; empty if only rotations are fixed. ``counts``: it holds the part whatever the axes are,
@@ -66,7 +66,7 @@ class Gravity(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids, or places) and the parts that it names."""
+    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids or indices) and the parts in it."""
 
     kind: str
     nodes: Places
@@ -109,7 +109,7 @@ class Boundary(NamedTuple):
         )
 
     def placed(self, table: NodeTable) -> Boundary:
-        """Return the same with node places in place of node ids."""
+        """Return the same boundary with node indices in place of node ids."""
         return Boundary(
             place_nodes(self.holds, table),
             self.gravity and place_nodes(self.gravity, table),
@@ -124,8 +124,8 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Replace node ids by places in the table; nodes that are not in the table are dropped."""
-    # The nodes of a joint are never None, which mypy reports for that kind alone.
+    """Replace node ids by indices in the table; nodes that are not in the table are dropped."""
+    # The nodes of a joint are never None, which mypy does not see for this kind.
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
         for load in acting
@@ -208,7 +208,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """Data of one part without its elements; ``unswitchable`` is the reason why it must not be switched, or empty."""
+    """Data of one part without its elements; ``unswitchable`` is the reason not to switch it, or empty."""
 
     id: int
     title: str
@@ -295,7 +295,7 @@ class Inventory:
 
     @cached_property
     def nodes_by_part(self) -> Mapping[int, Places]:
-        """Return the places of the nodes of every part, ascending."""
+        """Return the node indices of every part, ascending."""
         pieces_by_part: dict[int, list[Places]] = {}
         for elements in self.elements:
             order = np.argsort(elements.part, kind="stable")
@@ -384,7 +384,7 @@ class Inventory:
 
     @cached_property
     def ready(self) -> tuple[frozenset[int], ...]:
-        """Return for each rigid body in ``switched`` the parts that lie in it completely, without springs."""
+        """Return, for each rigid body in ``switched``, the parts that belong to it completely, without springs."""
         whole_parts = []
         for _, nodes, parts in self.switched:
             mask = self._mask(parts)
@@ -438,11 +438,11 @@ class Inventory:
         return self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()
 
     def rigid_nodes(self, parts: Iterable[int]) -> int:
-        """Return the number of nodes of some parts."""
+        """Return the number of nodes of given parts."""
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the number of elements by part and kind that are rigid once these parts are rigid bodies.
+        """Count, by part and kind, the elements that are rigid once these parts are rigid bodies.
 
         Radioss deactivates every element whose nodes all lie in a body, LS-DYNA the elements of the switched parts.
         """
@@ -467,7 +467,7 @@ class Inventory:
         return counts_by_part
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
-        """Return True for each node of some parts, shape (nodes,)."""
+        """Return an array (nodes,) that is True for the nodes of given parts."""
         mask = np.zeros(len(self.coordinates), bool)
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True

@@ -1,4 +1,4 @@
-"""Write part sets: if a card has too many parts to list them, it names a *SET_PART_LIST."""
+"""Write part sets: a card with too many parts to list names a *SET_PART_LIST."""
 
 from __future__ import annotations
 

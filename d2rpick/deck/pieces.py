@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Cached labels of the nodes of each deck: a mesh may have millions of nodes.
+# Cached node labels of each deck: a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
@@ -43,16 +43,16 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Nodes lie in one plane if they do so within this fraction of the size of their piece.
+# Nodes lie in one plane if they deviate from it by less than this fraction of the size of their piece.
 _FLAT: Final = 1e-6
-# A piece below this fraction of the mass of all pieces on springs moves the others too little to matter.
+# A piece below this fraction of the mass of all pieces on springs hardly moves the others.
 _HEAVY: Final = 0.05
 
 
 def count_pieces(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
 ) -> int:
-    """Return the number of pieces of some parts that nothing connects; 0 without elements.
+    """Return the number of disconnected pieces of given parts; 0 without elements.
 
     ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
     """
@@ -64,7 +64,7 @@ def count_pieces(
 def label_pieces(
     inventory: Inventory, parts: frozenset[int], *, springs: bool = True
 ) -> Places:
-    """Return for each node of the deck the number of its piece (nodes,); memoised.
+    """Return, for each node of the deck, the number of its piece (nodes,); cached.
 
     Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
     """
@@ -118,7 +118,7 @@ def _list_connections(
 def find_supports(
     inventory: Inventory,
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
-    """Return the supports of each part that has some, and the supports of the model.
+    """Return the supports of each supported part, and the supports of the model.
 
     A completely fixed piece is an obstacle: it is supported itself, but does not support a piece that it is not
     connected to.
@@ -183,14 +183,14 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds some nodes of a piece; fixed rotations count if the translations are free."""
+    """Return True if a support holds nodes of a piece; fixed rotations are counted if the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
 
 
 def _find_rotating_nodes(inventory: Inventory) -> Mask:
-    """Return for each node True if it has rotations."""
+    """Return an array that is True for nodes with rotations."""
     has_rotations = np.zeros(
         len(inventory.coordinates) + 1, bool
     )  # the last entry stands for NO_NODE
@@ -205,7 +205,7 @@ def _find_rotating_nodes(inventory: Inventory) -> Mask:
 def _find_symmetry_axes(
     inventory: Inventory, members: Places, fixed: Mask
 ) -> frozenset[int]:
-    """Return the axes along which a piece is held by a symmetry plane, or fixed completely; ``fixed`` is (members, 3).
+    """Return the axes along which a symmetry plane, or complete fixing, holds a piece; ``fixed`` is (members, 3).
 
     The piece lies on one side of the plane, all its nodes on the plane are fixed, and gravity does not act along the
     axis.
@@ -239,12 +239,12 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 
 
 # The longest period of pieces that oscillate on springs, from the masses and springs of a deck.
-#
-# A piece (connected without springs) has mass m, and the pieces that its springs connect to it have mass M.  The
-# reduced mass is mu = m M/(m + M).  A spring of stiffness k along the unit vector l adds k l l^T to the stiffness
-# matrix K.  The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).  A load is
-# transmitted first in the stiffest direction, so the period uses the largest lambda.  With the trace of K, the sum
-# of all k, it is the lower limit of all periods.
+# A piece (connected without springs) has mass m, and the pieces that its springs connect to it have mass M.
+# The reduced mass is mu = m M/(m + M).
+# A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K.
+# The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
+# A load is transmitted first in the stiffest direction, so the period uses the largest lambda.
+# With the trace of K, the sum of all k, it is the lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):

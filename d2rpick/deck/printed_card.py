@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
-WIDTH = 10  # columns of a field
+WIDTH = 10  # width of a field [characters]
 LONGEST = WIDTH - 1  # characters of a number: a blank separates it from the next field
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
 _COMMENT_WIDTH = 78
 
 PHYSICS = (
-    "The energy locked in at the first switch springs back at the second; the",
-    "  kinetic energy of the vibration is lost without a trace in any energy.",
-    "A switch comes at the first step at or after its time.",
-    "Stresses of solids without a co-rotating frame do not turn with the rigid",
-    "  body: after a large rotation they do not spring back as they should.",
+    "The energy frozen at the first switch springs back at the second; the",
+    "  kinetic energy of the vibration is lost, and no energy output shows it.",
+    "The solver switches at the first time step at or after each time.",
+    "Stresses of solids without a co-rotational frame do not rotate with the rigid",
+    "  body: after a large rotation they spring back in the wrong direction.",
     "Do not choose switching times from the energy of a switched run.",
 )
 
@@ -97,7 +97,7 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: ``text`` is all of it, ``files`` is the same by the file names that the solver expects.
+    """Solver input: ``text`` is all of it, and ``files`` has the same text by the file names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
@@ -180,7 +180,9 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
         if not 0 <= tr < td < math.inf:
-            raise DeckError(f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected")
+            raise DeckError(
+                f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected; give the earlier time as tr"
+            )
     for (tr, td), (later, end) in pairwise(windows):
         if not later > td:
             relation = "lies before" if end <= tr else "overlaps or touches"

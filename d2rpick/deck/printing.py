@@ -56,11 +56,11 @@ if TYPE_CHECKING:
 _FILE: Final = "switches.k"
 
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # CODE for no force and for a force
-_OF_OFFSET: Final = "OFFSET was not tried with the solver: it should exceed the thickness of the contact."
+_OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _DELETE, _ACTIVATE = 1, 2  # values of NRBF and NCSF for constraints on the parts
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
-    "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
+    "  (NRBF, NCSF, RWF 0); if any, delete them (1) and reactivate them (2).",
 )
 _DELETED = (
     "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
@@ -75,15 +75,15 @@ _OF_RADIOSS = (
     "  node groups; no warning is given.",
     "The energy reported for rigid solids can be wrong until the release.",
     "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
-    "A body that the first file does not put off is rigid from time 0.",
+    "A body that the first file does not deactivate is rigid from time 0.",
     "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
-    "  them there while the body is off.",
+    "  them there while the body is inactive.",
     "An initial velocity must move the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
 _BY_FORCE = (
     "The windows are those of the history: a switched run lands elsewhere, and at",
-    "  other times, after its first window that locks in energy.",
+    "  other times, after its first window that freezes vibration energy.",
     "They end in the first step of a contact, without a margin before it.",
 )
 _OF_SENSORS = tuple(
@@ -91,7 +91,7 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-DEFAULT: Final = "ls-dyna"  # solver for histories that name none
+DEFAULT: Final = "ls-dyna"  # solver for histories whose format belongs to no solver
 
 
 def _print_ls_dyna(
@@ -108,7 +108,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id in the same line, separated by a blank.
+        # The lead id follows another id on the same line, separated by a blank.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -144,7 +144,6 @@ def _write_window(
     printing: Printing,
     part_sets: PartSets,
 ) -> Iterator[str]:
-    # Both begin with a comment line.
     """Yield the lines of the two switch sets of one window."""
     rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
     deformable_lines = [*write_deformable_lines(ids, part_sets)]
@@ -194,7 +193,7 @@ def _print_ls_dyna_contact(
     """
     from d2rpick.deck.contact_timing import (
         find_pair_timing,
-    )  # not above: other cards do without
+    )  # imported here: other cards do not need it
 
     windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
@@ -282,7 +281,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     )
     if printing.merge is None and printing.bodies:
         yield from (
-            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
+            f"{len(body)} parts are one rigid body in the deck, with lead part {body[0]} (LRB)."
             for body in printing.bodies
             if len(body) > 1
         )
@@ -330,7 +329,7 @@ def _print_radioss_sensors(
     """
     from d2rpick.deck.radioss_sensors import (
         invert_spans,
-    )  # not above: other cards do without
+    )  # imported here: other cards do not need it
 
     windows, _, _ = _check_run(windows, printing)
     return _print_sensors(
@@ -416,7 +415,7 @@ def _print_sensors(
     )
     step_warning = (
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
-        " where it takes fewer without switching, set --step-cap to the deformable step or more."
+        " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
     # In the file too, since it may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
@@ -507,7 +506,7 @@ def _combine_card(
     files: Mapping[str, str],
     further_cards: str = "",
 ) -> PrintedCard:
-    """Combine comments, cards for the starter deck and engine files to a card."""
+    """Combine comments, cards for the starter deck and engine files into a card."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
     head = write_comments(
         [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]

@@ -1,4 +1,4 @@
-"""Write the rigid bodies that a Radioss deck lacks, as cards for its starter deck: one /RBODY for each group of parts.
+"""Write the rigid bodies that a Radioss deck lacks, as cards for its starter deck: one /RBODY per group of parts.
 
 Source: Altair's public help for /RBODY, /GRNOD, /INIVEL and /GRAV, and runs computed with OpenRadioss: gravity and
 initial velocities act on a rigid body only through its main node.
@@ -61,7 +61,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """Rigid bodies that switch some parts.
+    """Rigid bodies that switch the parts.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -76,7 +76,7 @@ class SwitchedBodies(NamedTuple):
 
 
 def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
-    """Find the rigid bodies of some parts in a Radioss deck, and write the missing ones.
+    """Find the rigid bodies of given parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
     is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first leg has to
@@ -162,7 +162,7 @@ def _is_unused(body: Body, unused: Collection[int]) -> bool:
 
 
 def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
-    """Return a remark if the body joins pieces that nothing else connects."""
+    """Return a remark if the body joins pieces that are not connected otherwise."""
     pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
@@ -170,14 +170,14 @@ def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
 
 
 def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Return the parts that do not consist of springs alone; all parts if each of them does."""
+    """Return the parts that do not consist of springs alone, or all parts if each does."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
 
 
 def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
-    """Return the ids of all nodes of some parts."""
+    """Return the ids of all nodes of given parts."""
     return frozenset(
         node
         for part in parts
@@ -186,7 +186,7 @@ def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]
 
 
 def _require_whole_starter(run: RadiossRun) -> Starter:
-    """Return the starter deck.
+    """Return the starter deck; DeckError if it is missing or incomplete.
 
     Raises
     ------
@@ -295,7 +295,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return main node and cards of a new body of some parts, with the velocities and gravity of its main node."""
+        """Return main node and cards of a new body of given parts, with the velocity and gravity of its main node."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")

@@ -74,8 +74,7 @@ INTERFACE: Final = DataLine(integers("grnod_ID surf_ID"))
 DENSITY: Final = DataLine(reals("rho", _REAL))
 ELASTIC: Final = DataLine(reals("E nu", _REAL))
 
-# /PROP: flags of shells and of solids, the thickness of shells, the area of beams and trusses, and springs
-SHELL_FLAGS: Final = DataLine(integers("Ishell Ismstr Ish3n"))
+# /PROP: flags of solids (of shells: Ishell, Ismstr, Ish3n), thickness of shells, area of beams and trusses, springs
 SOLID_FLAGS: Final = DataLine(
     integers("Isolid Ismstr Icpre Itetra10 Inpts Itetra4 flag7 Iframe")
 )

@@ -1,4 +1,4 @@
-"""Read keyword blocks of Radioss files: the legs in engine files and the bodies they switch, and the starter deck.
+"""Read keyword blocks of Radioss files: the legs in engine files, the switched bodies, and the starter deck.
 
 A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
 for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
@@ -51,7 +51,7 @@ WITHOUT_FRAME: Final = {
     "SHEL16",
 }
 _RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe
+_ICOROTATIONAL: Final = 2  # value of Iframe for a co-rotational frame
 # Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
 _NOT_TURNED: Final = {
     1,
@@ -87,7 +87,7 @@ def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
-    """Return the same for a piece of whole lines."""
+    """Return the result of `_find_marks` for a piece of complete lines."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
@@ -131,7 +131,7 @@ def get_number(card: Card, at: int = 1) -> int:
 
 
 def get_lines_below_title(card: Card) -> tuple[Row, ...]:
-    """Return the lines below the title that are not blank; the title itself may be blank."""
+    """Return the non-blank lines below the title; the title itself may be blank."""
     return tuple(row for row in card.rows[1:] if not row.blank)
 
 
@@ -145,7 +145,7 @@ class InitialVelocity(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class RadiossLeg:
-    """One engine run: name and number from /RUN, its end, the main nodes that it switches, and its time-step limit."""
+    """One engine run: name and number from /RUN, its end, its switched main nodes, and its time-step limit."""
 
     run: Card
     name: str
@@ -158,9 +158,9 @@ class RadiossLeg:
     cap: Value[float] | None = None
     version: str = ""
     starts: list[InitialVelocity] = field(default_factory=list)
-    # Sensors that are reset at its start.
+    # Sensors that are reset at the start of the leg.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # sensor that ends it, at an unknown time
+    sensor: int = 0  # sensor that ends the leg at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
@@ -309,7 +309,7 @@ class Starter:
 
     @cached_property
     def rigid(self) -> RigidBodies:
-        """Return the rigid bodies as the engine has them."""
+        """Return the rigid bodies as the engine uses them."""
         written = [*self._written_bodies(), *self._bodies_of_parts()]
         return make_rigid_bodies(written, [*self._merges()], self._last_node)
 
@@ -436,7 +436,7 @@ class Starter:
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
-        # The flags of each property; their line may be blank.
+        # Flags of each property; the line of the flags may be blank.
         flags = {
             get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids
@@ -496,7 +496,7 @@ class Starter:
                 yield node
 
     def _parts_of(self, kind: str, ids: Collection[int]) -> Iterator[int]:
-        """Yield the parts with one of some materials, or properties."""
+        """Yield the parts with one of the given materials or properties."""
         for part, line in self.parts.items():
             if (line.material if kind == "MAT" else line.prop) in ids:
                 yield part

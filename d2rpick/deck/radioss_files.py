@@ -1,4 +1,4 @@
-"""Recognise the files of a Radioss run, and name what can be wrong with it: all that readers of LS-DYNA decks need."""
+"""Recognise the files of a Radioss run, and name its possible flaws, as far as readers of LS-DYNA decks need it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"
 NOT_FOLLOWED: Final = "deck-not-followed"
 LEFT_RIGID: Final = "body-left-rigid"
-# Short text of each flaw that makes a run useless, with the rule that explains it.
+# Short text of each flaw that ruins a run, with the rule that explains it.
 RUINS: Final = {
     THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
     AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
@@ -43,7 +43,7 @@ class Flaw(NamedTuple):
 
 
 def is_radioss(head: bytes) -> bool:
-    """Return True if a file that begins like this is a starter deck or an engine file."""
+    """Return True if a file with these first bytes is a starter deck or an engine file."""
     first = _KEYWORD.search(head)
     return (
         first is not None
@@ -62,16 +62,16 @@ def list_run_files(path: str) -> list[str]:
         if not os.path.isfile(path):  # noqa: PTH113  start-up
             return []  # a pipe can be read only once
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
-            # a larger buffer than the file costs ten times the reading
+            # reading into a buffer larger than the file takes ten times as long
             head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
         if not is_radioss(head):
             return []
-        from pathlib import Path  # not above: start-up
+        from pathlib import Path  # imported here to start faster
 
         folder = Path(path).parent
         file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects: there may be many runs
     except (OSError, ValueError):
-        return []  # whoever reads the file reports the error
+        return []  # the reader of the file reports the error
     name = _find_run_name(path, head)
     numbered = (
         re.fullmatch(_NUMBERED, file_name)

@@ -1,4 +1,4 @@
-"""Find what makes a Radioss run with switched rigid bodies useless, although the starter at most warns.
+"""Find flaws that ruin a Radioss run with switched rigid bodies, although the starter at most warns about them.
 
 Source: the published source of OpenRadioss at bd4557ba7 (kinchk.F, checkrby.F, hm_read_rwall_*.F, lecinv.F), Altair's
 public help for /RWALL, /RBODY, /INIVEL and /INIV, and runs computed with OpenRadioss.
@@ -65,7 +65,7 @@ class NodeGroups:
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
-        """Return the node ids by part; parts with particles are left out, as these are not read."""
+        """Return the node ids by part; parts with particles are left out, because particles are not read."""
         nodes_by_part: dict[int, list[Integers]] = {
             part: [np.empty(0, np.int64)] for part in self._starter.parts
         }
@@ -97,7 +97,7 @@ class NodeGroups:
 
 
 def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
-    """Return the flaws of a run in which the rigid bodies with these main nodes are switched, or kept off.
+    """Return the flaws of a run whose rigid bodies with these main nodes are switched, or kept off.
 
     A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
     """
@@ -135,7 +135,7 @@ def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
 
 
 def _name_bodies(bodies: Sequence[Body]) -> str:
-    """Return the names of some bodies."""
+    """Return the names of bodies."""
     return f"/RBODY {', '.join(format_ranges(body.id for body in bodies))}"
 
 

@@ -82,7 +82,7 @@ _ELASTIC: Final = {
 }
 _VOID: Final = {"VOID", "LAW0", "LAW00"}
 _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
-# Properties with the thickness in the same columns.
+# Types of shell properties that have the thickness in the same columns.
 _PLAIN_SHELLS: Final = {
     "SHELL",
     "TYPE1",
@@ -106,7 +106,7 @@ _AREA_LINE: Final = {
     "TYPE3": 2,
     "TRUSS": 0,
     "TYPE2": 0,
-}  # line of the area below the title
+}  # number of the line with the area, below the title
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {
     "SPR_GENE",
@@ -132,7 +132,7 @@ _AXES: Final = "XYZ"
 
 
 class _Property(NamedTuple):
-    """A property as written: its type, its formulation flags for shells, triangles and solids, and its section."""
+    """A property as written: its type, formulation flags of shells, triangles and solids, and its section."""
 
     type: str
     shell: int = 0
@@ -255,7 +255,7 @@ def _collect_parts(
 def _choose_material(
     written: Material | None, prop: _Property | None, rigid: bool
 ) -> Material | None:
-    """Return the material of a part: springs have their stiffness in the property, and a rigid body is rigid."""
+    """Return the material of a part: springs have their stiffness in the property, rigid bodies a rigid material."""
     if prop and prop.type in _OF_SPRINGS:
         return Material(f"PROP/{prop.type}", "spring")
     if written and rigid:
@@ -367,7 +367,7 @@ def _read_spring_section(rows: Sequence[str]) -> Section:
 
 
 def _read_shell_section(rows: Sequence[str]) -> Section:
-    """Read thickness and integration points of a shell; 0 points mean global integration, which counts as one."""
+    """Read thickness and integration points of a shell; 0 points mean global integration, counted as one."""
     points = SHELL_SECTION["N"].cut(rows[2]).strip() if len(rows) > 2 else None
     if points is None:
         layers = None
@@ -411,11 +411,11 @@ def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
 
 
 def _name_card(card: Card) -> str:
-    """Return the keyword with its place."""
+    """Return the keyword with its file and line."""
     return f"/{card.name} ({card.at})"
 
 
-# Supports and imposed motion.
+# Supports and prescribed motion.
 
 
 def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]:
@@ -533,7 +533,7 @@ def _find_gravity(starter: Starter) -> Iterator[model.Gravity | str]:
 def _read_gravity_card(
     card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]
 ) -> model.Gravity | None:
-    """Read values and nodes of a /GRAV; None if they are unknown. Before its sensor is active it is 0."""
+    """Read values and nodes of a /GRAV; None if they are unknown. Before its sensor is active, gravity is 0."""
     row = get_lines_below_title(card)[0]
     function, skew, sensor, group = (
         card.integer(row, GRAVITY[name]).value
@@ -578,8 +578,9 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
         )
 
 
-# Joints connect parts that share no nodes: ties, and rigid bodies that are always on.  While a part is rigid, they must
-# be off, as a node cannot obey two of them (Altair's help on incompatible kinematic conditions).
+# Joints connect parts without shared nodes: ties, and rigid bodies that are always on.
+# While a part is rigid they must be off, as a node cannot belong to two of them
+# (Altair's help on incompatible kinematic conditions).
 
 
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:

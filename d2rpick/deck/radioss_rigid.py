@@ -1,4 +1,4 @@
-"""Build the rigid bodies as the starter of Radioss does: each with a main node, and merged according to /MERGE/RBODY.
+"""Build the rigid bodies as the Radioss starter does: each with a main node, and merged according to /MERGE/RBODY.
 
 Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
 computed with it.  Bodies of parts were not computed, as the function that makes them is in no program at hand: their
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    Group = tuple[str, tuple[int, ...]]  # kind of its members, and their ids
+    Group = tuple[str, tuple[int, ...]]  # kind and ids of the members of a node group
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
@@ -47,7 +47,7 @@ class Body(NamedTuple):
 
 
 class Merge(NamedTuple):
-    """A line of /MERGE/RBODY: the main body and what is merged into it, each with the kind of its id."""
+    """A line of /MERGE/RBODY: the main body and the merged one, each with the kind of its id."""
 
     main_kind: int
     main: int
@@ -70,7 +70,7 @@ class RigidBodies(NamedTuple):
 def make_rigid_bodies(
     in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]
 ) -> RigidBodies:
-    """Return the rigid bodies of a deck as the engine has them.
+    """Return the rigid bodies of a deck as the engine uses them.
 
     Parameters
     ----------

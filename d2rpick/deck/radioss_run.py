@@ -89,7 +89,7 @@ class RadiossRun:
 
     @property
     def pushed(self) -> bool:
-        """Return True if rigid walls or given velocities may act on its bodies."""
+        """Return True if rigid walls or given velocities may act on the bodies of the run."""
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
@@ -149,7 +149,7 @@ def _read_include(
     card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
 ) -> None:
     """Add the file that an #include names, or record that it was not read."""
-    from pathlib import Path  # not above: start-up
+    from pathlib import Path  # imported here to start faster
 
     words = card.block.head.split(maxsplit=1)[1:]
     name = words[0].strip() if words else ""
@@ -316,7 +316,7 @@ def find_course(
     contacts: Contacts | None,
     forces: Forces | None = None,
 ) -> Course:
-    """Return the course of a run for the sensors that switch some parts."""
+    """Return the course of a run for the sensors that switch the parts."""
     has_contacts = (
         contacts is not None
         and parts
@@ -372,7 +372,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return the parts that lie completely in the group of each body: named by it, or with all nodes in it.
+    """Return the parts that belong completely to the group of each body: named by it, or with all nodes in it.
 
     Parameters
     ----------
@@ -393,12 +393,12 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Another part may lie on the nodes of the named parts, as a skin does.
+    # Another part may use nodes of the named parts, as a skin does.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
     if incomplete:
-        from d2rpick.deck.mesh import find_parts_within  # loads numpy
+        from d2rpick.deck.mesh import find_parts_within  # imported here: it loads numpy
 
         for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
@@ -454,7 +454,7 @@ def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
 
 
 class LeftRigid(NamedTuple):
-    """Parts that stay rigid in a run that switches others, the place of the cure, the problem and the cure."""
+    """Parts that stay rigid in a run that switches others, with the line to change, the problem and the cure."""
 
     parts: tuple[int, ...]
     place: CardField
@@ -465,7 +465,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies that no leg names and that contain whole parts, in a run with ``windows``.
+    """Return the bodies with complete parts that no leg names, in a run with ``windows``.
 
     None if there are none.
     """

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # of time
-    # When the force of an interface or rigid wall acts, by its kind and number; None where that is not known.
+    Spans = tuple[tuple[float, float], ...]  # spans of time
+    # Spans in which the force of an interface or rigid wall acts, by its kind and number; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
 # Input version from which a time sensor has an end (Tstop).
 STOPS_SINCE: Final = 2023
-NEVER: Final = 1e20  # times from here on never come
-# Kinds of force sensors, with the name that histories use for what exerts the force.
+NEVER: Final = 1e20  # later times are never reached
+# Kinds of force sensors, with the names of their force in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
 # Types of /INTER without contact force on a flying body: ties, fluids, and parts of other contacts.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
@@ -38,7 +38,7 @@ _SINGLE: Final = (
 
 
 class Course(NamedTuple):
-    """Known course of a run.
+    """The known course of a run.
 
     The time of the first reset of each sensor, and the spans in which contact forces act [time].
 
@@ -65,7 +65,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Find when a sensor is active: spans (from, to) in order, or what cannot be followed, in words.
+    """Find when a sensor is active: spans (from, to) in order, or a text that says what cannot be followed.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.
@@ -117,7 +117,7 @@ def find_active_spans(
 def _find_forced_spans(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
-    """Follow a sensor of any force: active from the force on, or Tmin later, to Tdelay after it."""
+    """Follow a force sensor: active from the force (or Tmin later) to Tdelay after the force."""
     keyword = starter.sensors[number].words[1]
     name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
     if len(rows) < 2:
@@ -169,7 +169,7 @@ def find_contacts_of_sensor(
 
 
 def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
-    """Sensors that another one asks for."""
+    """Return the input sensors of a sensor."""
     card = starter.sensors.get(number)
     rows = (
         get_lines_below_title(card)

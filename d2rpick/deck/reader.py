@@ -74,17 +74,17 @@ _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
 )
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled on use
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled at first use
 # Keywords that seem to be switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # levels of nested includes
+_DEEPEST = 60  # largest number of nested includes
 _MOST_FILES = 10_000
 _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Keywords of engine files that need values: a file that ends with one of them alone is truncated.
+# Engine keywords that need values: a file that ends with one of them alone is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -119,7 +119,7 @@ class Restart(NamedTuple):
 def _read_include_card(
     card: Card,
 ) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
-    """Yield for each file of an ``*INCLUDE`` card its name, its transform, and the unreadable fields of the transform.
+    """Yield for each file of an ``*INCLUDE`` card its name, its transform, and unreadable fields of the transform.
 
     ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
     """
@@ -194,7 +194,7 @@ def _read_transform(
 
 def _get_folder(file: str) -> Path:
     """Return the folder of a file."""
-    from pathlib import Path  # not above: only decks with includes need it
+    from pathlib import Path  # imported here: only decks with includes need it
 
     return Path(file).parent
 
@@ -223,7 +223,7 @@ class Deck:
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
     long: bool = False  # True if the main file ends in long format
-    restarts: dict[str, Restart] = field(default_factory=dict)  # by file
+    restarts: dict[str, Restart] = field(default_factory=dict)  # restarts by file
 
     @property
     def files(self) -> list[str]:
@@ -240,7 +240,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards by name and by each beginning of the name before an ``_``: every rule asks for some."""
+        """Return the cards by name and by each beginning of the name before an ``_``, as rules request both."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):
@@ -281,7 +281,7 @@ class Deck:
         return cards_by_file
 
 
-@lru_cache(1024)  # decks use the same keywords
+@lru_cache(1024)  # cached, because decks use the same keywords repeatedly
 def _list_stems(name: str) -> tuple[str, ...]:
     """Return a name and each beginning of it before an ``_``."""
     return tuple(
@@ -327,7 +327,7 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
 
 
 class _Context(NamedTuple):
-    """What an included file inherits from the including file."""
+    """Data that an included file inherits from the including file."""
 
     scope: Scope
     width: int = STANDARD
@@ -384,7 +384,7 @@ class _Reader:
             )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
-        """Store a card, or do what it tells the reader."""
+        """Store a card, or carry out its instruction to the reader."""
         if card.name.startswith("COMMENT"):
             if re.search(
                 r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",
@@ -484,7 +484,7 @@ def _parse_keyword(head: str) -> tuple[str, str]:
 
 
 def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
-    """Yield the last block of each file that seems to be truncated, and the sign of it.
+    """Yield the last block of each file that seems to be truncated, and the evidence.
 
     An include may have no *END. A main file without *END is reported if it ends within a mesh, because the program that
     writes a mesh also writes the end. A last line without line end may lack digits of a number.
@@ -498,7 +498,7 @@ def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
 
 
 def describe_cure(block: Block) -> str:
-    """Return what to do about a file that ends with this block, which `cuts` has reported."""
+    """Return the cure for a file that ends with this block, which `find_cuts` has reported."""
     if not block.source.ends_with_line():
         return "use the complete file, or end its last line"
     end_mark = "/END" if block.head.startswith("/") else "*END"
@@ -524,7 +524,7 @@ def _has_whole_end(block: Block) -> bool:
 
 
 def _find_sign_of_cut(block: Block, *, main: bool) -> str:
-    """Return the sign that a file is truncated, or an empty text."""
+    """Return the evidence that a file is truncated, or an empty text."""
     mesh = has_mesh(block)
     radioss = block.head.startswith("/")
     if not block.source.ends_with_line() and not _has_whole_end(block):

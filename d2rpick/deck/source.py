@@ -1,4 +1,4 @@
-"""Read a deck file: find its keywords without looking at each line of the mesh, and return the lines between them."""
+"""Read a deck file: find its keywords without reading each line of the mesh, and return the lines between them."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# Bytes searched together: the buffer is reused and stays in the processor's cache.
+# Bytes searched at a time: the buffer is reused and fits into the processor's cache.
 _SEARCHED: Final = 3 << 18
 _HELPERS: Final = 1  # additional threads: bytes are copied in parallel, but only one thread searches at a time
 _ALONE: Final = 4  # pieces that one thread searches before a second one has started
-_LOOKBACK: Final = 32  # bytes before a piece, for blanks before its first mark and for a mark on the border
+_LOOKBACK: Final = 32  # bytes before a piece, for blanks before its first mark and for a mark across its border
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
 # Offset of a letter that mesh data never contains, so that the search for it is fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 
 _PIECE: Final = 4 << 20  # bytes of whole lines that are processed together
-# Line ends are counted in this fraction of a piece, which stays in the processor's cache.
+# Line ends are counted in this fraction of a piece, which fits into the processor's cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # bytes that are searched for the first line end
 _HEAD: Final = 1024  # bytes of a keyword line that are read
 _BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
 _SILENCE: Final = (
-    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled on use
+    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled at first use
 )
 
 
@@ -86,7 +86,9 @@ class _Search:
         """Start an additional thread without waiting for it."""
         helping = _thread.allocate_lock()
         helping.acquire()
-        with suppress(RuntimeError):  # no further thread available: search without help
+        with suppress(
+            RuntimeError
+        ):  # no further thread is available, so this one searches alone
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
@@ -99,7 +101,7 @@ class _Search:
             helping.release()
 
     def go_on(self) -> None:
-        """Search the remaining pieces in one buffer: new memory costs more than copying into it."""
+        """Search the remaining pieces in one buffer, because new memory costs more than copying into it."""
         marks_by_piece: dict[int, Sequence[int]] = {}
         piece = bytearray(_LOOKBACK + min(self._piece, self._file.size))
         with self._file.opened() as fill:
@@ -120,13 +122,13 @@ class _Search:
         )
 
     def stop(self) -> None:
-        """Leave no pieces to the other threads, and wait until these have ended."""
+        """Take all remaining pieces from the other threads, and wait until the threads have ended."""
         self._waiting = iter(())
         for helping in self._helping:
             helping.acquire()
 
     def result(self) -> Sequence[int]:
-        """Return all marks; pieces that a helper left are searched here, where errors are raised."""
+        """Return all marks; pieces left by a helper are searched here, where errors are raised."""
         if remaining := [begin for begin in self.pieces if begin not in self._found]:
             self._waiting = iter(remaining)
             self.go_on()
@@ -164,8 +166,8 @@ def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
 
 
 def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
-    # A head that continues in the next piece is found there, because that piece begins with the end of this one.
-    """Return the offsets of the heads of encrypted blocks."""
+    # A header that continues in the next piece is found there, because that piece begins with the end of this one.
+    """Return the offsets of the headers of encrypted blocks."""
     offsets = []
     at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
     while at >= 0:
@@ -182,7 +184,7 @@ def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 class SourceFile:
-    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of the same state of the file.
+    """One deck file, read as bytes and decoded as Latin-1; all reads belong to one state of the file.
 
     ``name`` is the path for messages. ``content`` is given if the content is not in a file or the file is open already.
     ``piece`` bytes are processed together. Line numbers are counted on request: in a large deck counting takes longer
@@ -206,7 +208,7 @@ class SourceFile:
         elif isinstance(content, bytes):
             content = HeldInMemory(content)
         self._file = content
-        # Offsets and the line numbers at them, ascending.
+        # Ascending offsets at which the line number is known, with that number.
         self._counted = [(0, 1)]
         self._longest = bound("LINE")
 
@@ -307,12 +309,12 @@ class SourceFile:
 
 @dataclass(eq=False, repr=False)
 class Block:
-    """A keyword with all lines up to the next keyword, or an encrypted block: a place in a file."""
+    """A keyword with all lines up to the next keyword, or an encrypted block, as a range of a file."""
 
     source: SourceFile
     start: int
     end: int | None
-    head: str  # the keyword line
+    head: str  # text of the keyword line
 
     @property
     def encrypted(self) -> bool:
@@ -335,7 +337,7 @@ class Block:
         *lines, last = self.source.text(self.start, self.end).split("\n")
         if (
             last and self.end is None
-        ):  # otherwise these are the blanks before the next keyword
+        ):  # otherwise the piece contains the blanks before the next keyword
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)
         return [
@@ -354,7 +356,7 @@ class Block:
         above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
             BYTE_ORDER_MARK
         )
-        # The last element is the blanks before the keyword.
+        # The last element contains the blanks before the keyword.
         lines = above.decode("latin-1").split("\n")[:-1]
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    # Copies the bytes between two offsets into a buffer, and returns their number.
+    # Function that copies the bytes between two offsets into a buffer, and returns their number.
     Filling = Callable[[bytearray, int, int], int]
 
 
 # Largest file that is kept in memory [bytes]: a deck may have thousands of includes.
 HELD_UP_TO: Final = 1 << 18
-# Least number of bytes read at a time: the next request is mostly close by.
+# Least number of bytes read at a time, as the next request is mostly close by.
 _WINDOW: Final = 1 << 16
 # Number of cached pieces: the ends of the large blocks of a deck are read repeatedly.
 _KEPT: Final = 8
@@ -61,7 +61,7 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        self._windows: dict[int, bytes] = {}  # by their offset, the oldest first
+        self._windows: dict[int, bytes] = {}  # by offset, the oldest first
 
     def read(self, begin: int, end: int) -> bytes:
         """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""

@@ -38,7 +38,7 @@ class Suiting(NamedTuple):
 
 
 def find_suiting(path: str, parts: Collection[int]) -> Suiting:
-    """Return the requirements of a deck on a card that switches some parts.
+    """Return the requirements of a deck on a card that switches given parts.
 
     Raises
     ------
@@ -86,10 +86,12 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Return True if there are constraints and each lies on these parts alone, so that all of a kind may be deleted."""
+    """Return True if there are constraints and each belongs to these parts alone, so that all may be deleted."""
     if not constraints:
         return False
-    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_first_parts,
+    )  # imported here: it loads numpy
 
     cards = find_element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the D2R lines of some parts or their sets, lead parts first."""
+    """Yield the D2R lines of given parts or their sets, lead parts first."""
     yield TO_RIGID.write_names()
     for lead, members in group_by_lead(ids, printing).items():
         yield from (
@@ -34,7 +34,7 @@ def write_rigid_lines(
 def write_deformable_lines(
     ids: Sequence[int], part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the R2D lines of some parts or their set."""
+    """Yield the R2D lines of given parts or their set."""
     yield TO_DEFORMABLE.write_names()
     yield from (
         TO_DEFORMABLE.write(PID=name, PTYPE=kind)
@@ -60,7 +60,7 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """What a switch set waits for: its CODE, the contact, TIME3 [time], the id of its pair (``other``) and PAIRED.
+    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of its pair (``other``) and PAIRED.
 
     ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
     switches. 0 stands for none.

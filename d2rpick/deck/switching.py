@@ -55,12 +55,12 @@ _INERTIA_ROWS: Final = (
 
 
 class Switched(NamedTuple):
-    """One part line: a part, or a part set (``by_set``), that is made rigid or deformable."""
+    """One part line: a part, or a part set (``by_set``), that becomes rigid or deformable."""
 
     part: Value[int]
     by_set: bool
     to_rigid: bool
-    lead: Value[int] | None = None  # LRB; a D2R line only
+    lead: Value[int] | None = None  # LRB; only on a D2R line
 
 
 class SwitchHeader(NamedTuple):
@@ -98,12 +98,12 @@ class SwitchSet:
     count_problem: str = ""
     part: Value[int] | None = None  # part of *DEFORMABLE_TO_RIGID_INERTIA
     restart: Restart | None = (
-        None  # in which it stands, where it is known when that begins
+        None  # restart that contains the card, if its start is known
     )
 
     @cached_property
     def time(self) -> float | None:
-        """Return the switching time [time of the whole deck]; None if no time decides."""
+        """Return the switching time [time of the whole deck]; None if it does not switch by time."""
         if self.restart:
             return self.restart.at
         if self.kind == "plain":
@@ -154,10 +154,10 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
 
 
 def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
-    """Yield cards that resemble switching cards but are none, with the keyword that was probably meant."""
+    """Yield cards that resemble switching cards but are none, with the probably intended keyword."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
-            from difflib import get_close_matches  # start-up
+            from difflib import get_close_matches  # imported here to start faster
 
             name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
@@ -251,7 +251,7 @@ def _read_automatic(card: Card) -> SwitchSet:
 
 
 def _describe_missing(rows: Sequence[Row]) -> str:
-    """Return which of the two header lines are missing, also if a part line takes their place; empty if none is."""
+    """Return which header lines are missing, also if a part line is in their place; empty if none is missing."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
@@ -437,7 +437,7 @@ class SwitchWindow(NamedTuple):
 
 
 class Windows(NamedTuple):
-    """All rigid windows of a deck by unit and time; ``orphans`` switch back a unit that nothing made rigid before.
+    """All rigid windows of a deck by unit and time; ``orphans`` switch back a unit that was not made rigid before.
 
     ``other_rigid`` and ``other_deformable`` are units that are switched at unknown times (CODE 1-5, restarts).
     """
@@ -471,7 +471,7 @@ def find_windows(
     windows: list[SwitchWindow] = []
     orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
-        # at equal times the switch back comes first: both at once give no window
+        # at equal times the switch back comes first: a window of length 0 is none
         unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),

@@ -1,4 +1,4 @@
-"""Find the parts that must not be made rigid and deformable again, whatever their energy is, and say why.
+"""Find the parts that must not be switched regardless of their energy, and say why.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
 has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
@@ -50,7 +50,6 @@ _LAWS_WITH_REFERENCE: Final = {
     *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
 }
 _TOTAL_STRAIN: Final = {10, 11, 12}  # values of Ismstr of solids
-_ISMSTR: Final = 1  # field of Ismstr in the first line of the property
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
@@ -91,7 +90,7 @@ def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
     from d2rpick.deck.radioss_deck import (
         get_number,
-    )  # not above: only Radioss decks need it
+    )  # imported here: only Radioss decks need it
 
     flowing = {
         get_number(card, 2): card.words[0]

@@ -133,7 +133,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         )
     for block, sign in find_cuts(
         deck
-    ):  # the added lines would hide it, and complete a truncated number
+    ):  # the added lines would hide the truncation, and complete a truncated number
         if block.source is deck.sources[0]:
             raise DeckError(
                 f"{deck.path}: {sign} The added cards would hide this: {describe_cure(block)}"
@@ -141,7 +141,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
-        # The suffix - keeps the fields of the card 10 columns wide.
+        # The suffix - keeps the fields of the card 10 characters wide.
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
     yield (
         Path(main).name,
@@ -253,7 +253,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
             node
             for node in find_bodies_kept_off(run.legs)
             if node not in switched_nodes
-        ]  # otherwise they would be rigid from time 0
+        ]  # without these lines the bodies would be rigid from time 0
         # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
         lines = (
             write_numbers(off_nodes)
@@ -281,7 +281,7 @@ def _edit_file(
 
 
 def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
-    """Return a file of the starter deck without some rigid bodies, by their ids."""
+    """Return a file of the starter deck without the bodies with these ids."""
     content = source.read(0)
     for block in reversed([*read_blocks(source)]):
         if (
@@ -377,7 +377,7 @@ def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
 def _refuse_other_run(
     leg: RadiossLeg, root: str, printed: Sequence[RadiossLeg]
 ) -> None:
-    """Raise DeckError if the cards are for another run, or the run switches their bodies already."""
+    """Raise DeckError if the cards are for another run, or the run already switches their bodies."""
     if printed[0].name not in (leg.name, root):
         raise DeckError(
             f"the cards are for run {printed[0].name!r}, but this is run {leg.name!r}; print them with this name"
@@ -413,7 +413,7 @@ def read_block(block: Block) -> bytes:
     return content if content.endswith(b"\n") else content + b"\n"
 
 
-# Legs that are decided while the run is computed.
+# Legs that are chosen while the run is computed.
 
 
 class DrivenDeck(NamedTuple):
@@ -474,7 +474,7 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import find_bodies  # not above: loads numpy
+    from d2rpick.deck.radioss_bodies import find_bodies  # imported here: it loads numpy
 
     run = read_run(path)
     if run.starter is None or not run.legs:

@@ -1,4 +1,4 @@
-"""Choose the flight that counts at a td: from the evidence, an oscillator, the energy, or what the user gives."""
+"""Choose the flight at a td: from evidence of no force, an oscillator, the energy, or times given by the user."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History, Samples
 
-# An energy that keeps its level has at least this many turning points; with fewer it must not change.
+# Fewest turning points of an energy that vibrates about a constant level; with fewer the energy must be constant.
 _LEAST_TURNS: Final = 4
 
 
 class Described(NamedTuple):
-    """A window in which a model describes the vibration, from its first to its last state [time].
+    """A window in which an oscillator model describes the vibration, from its first to its last state [time].
 
     ``energy`` returns the kinetic plus elastic energy of the vibration at times (n,).  ``alpha`` is its damping
     [1/time], None if several modes have different dampings.
@@ -133,17 +133,20 @@ def start_flight_at(
             described=described is not None,
         )
     if flight.end is not None and after >= flight.end:
-        ended = f"the {name_source(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
+        ended = f"the flight ends at {flight.end:.6g} according to the {name_source(flight.source)}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
-    )  # an oscillator is searched from `after` on, so its start shows nothing
+    )  # the oscillator is fitted from `after` on, so its start is no evidence of the end of the load
     if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):
         evidence = f"the {name_source(flight.source)} shows that the flight begins at {flight.start:.6g}"
-        doubts = (*doubts, f"{evidence}, after `after` {after:.6g}, which is used")
+        doubts = (
+            *doubts,
+            f"{evidence}, after `after` {after:.6g}, which is used nevertheless",
+        )
     return flight._replace(start=after, source="given", doubts=doubts)
 
 
@@ -171,35 +174,38 @@ def end_flight_at(
         and flight.source not in ("energy", "given")
     ):
         evidence = f"the {name_source(flight.source)} shows that the flight ends at {flight.end:.6g}"
-        doubts = (*doubts, f"{evidence}, before `landing` {landing:.6g}, which is used")
+        doubts = (
+            *doubts,
+            f"{evidence}, before `landing` {landing:.6g}, which is used nevertheless",
+        )
         flight = flight._replace(source="given")
     return flight._replace(end=landing, doubts=doubts)
 
 
 def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:
-    """Return True if nothing flies at td and the nearest flight ends before ``after`` or begins after td."""
+    """Return True if there is no flight at td, and the nearest flight ends before ``after`` or begins after td."""
     if not flight.refusal or flight.start is None:
         return False
     return flight.start > td or (flight.end is not None and flight.end <= after)
 
 
 def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
-    """Return the doubts about a flight that the user gives, including the reason why the evidence refuses it."""
+    """Return the doubts about a user-given flight, with the reason why the evidence shows no flight."""
     if not flight.refusal:
         return flight.doubts
     return (
         *flight.doubts,
-        f"the flight is used as it is given, although {flight.refusal}",
+        f"the flight is used as given, although {flight.refusal}",
     )
 
 
 def _find_end_of_window(history: History, described: Described) -> float | None:
-    """Return the end of a described window, None if it is the end of the record."""
+    """Return the end of a described window; None if the record ends there."""
     return described.end if described.end < history.time[-1] else None
 
 
 def _detect_load_in_window(history: History, described: Described) -> float:
-    """Return NaN if the energies in a window change by more than the damping of the vibration explains, else 0."""
+    """Return NaN if the energies in a window change by more than damping of the vibration explains, else 0."""
     from d2rpick.flight.work import is_taken_by_damping
 
     if history.balance is None:
@@ -210,7 +216,7 @@ def _detect_load_in_window(history: History, described: Described) -> float:
 
 
 def _explain_why_fed(history: History, start: float, end: float) -> str | None:
-    """Return the reason why energies show that a window is no flight, None if they do not.
+    """Return the reason why the energies show that a window is not a flight; None if there is no such reason.
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
     """
@@ -223,13 +229,13 @@ def _explain_why_fed(history: History, start: float, end: float) -> str | None:
         turns < _LEAST_TURNS
         and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy
     ):
-        return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
+        return f"from {start:.6g} to {end:.6g} the internal energy has {turns} extrema: too few to recognise a flight"
     from d2rpick.flight.work import compute_change_of_balance
 
     change = compute_change_of_balance(balance, start, end)
     if change is not None and change > MOST_WORK * max(energy, 0.0):
         change_text = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
-        return f"{change_text}, at a mean internal energy of {energy:.3g}: a load works there"
+        return f"{change_text}, at a mean internal energy of {energy:.3g}: a load does work there"
     if not has_whole_motion(balance, start, end):
         return (
             f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of "

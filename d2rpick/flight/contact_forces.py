@@ -1,4 +1,4 @@
-"""Find flights from the forces of contacts and rigid walls: windows in which none of them acts.
+"""Find flights from the forces of contacts and rigid walls, as the windows without such a force.
 
 Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
 its parts, and a contact whose force is not written, or any other load, may act all the same.
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Least share of its impulse that a contact from outside leaves in the model's momentum. The forces of sampled,
-# intermittent contacts leave 1/3 of it open.
+# An external contact leaves at least this share of its impulse in the momentum of the model.
+# In sampled forces of intermittent contacts 1/3 of the impulse is uncertain.
 _INNER: Final = 0.2
-# Number of pieces of a flight whose mean energies are compared, and the rise between them that shows a crash, as a
-# share of the highest energy. Computed flights with many beating modes rise by up to 0.06; a crash by nearly 1.
+# Number of pieces of a flight whose mean energies are compared. A rise of the mean by the second share of the
+# highest energy shows a crash: computed flights with many beating modes rise by up to 0.06, a crash by nearly 1.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
 
 class Touches(NamedTuple):
-    """The intervals in which a contact acts: ``acts`` (n,) for the one that ends at the state ``time`` (n,)."""
+    """The intervals with a contact force: ``acts`` (n,) belongs to the interval that ends at state ``time`` (n,)."""
 
     time: Samples
     acts: NDArray[np.bool_]
@@ -41,7 +41,7 @@ class Touches(NamedTuple):
     def of(
         cls, forces: Sequence[ContactForce], whole: Momenta | None = None
     ) -> Touches | None:
-        """Join the forces of all contacts that act at some times and not at others; return None if there is none.
+        """Join the forces of all contacts that are intermittent; return None if there is none.
 
         A contact that always acts holds parts together, like a tied one; one that never acts may belong to other parts.
         One that does not change the momentum of the ``whole`` model, if this is known, acts between the model's own
@@ -64,7 +64,7 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Return the window around ``td`` [time] in which nothing touches, None if something does or it is too short.
+        """Return the window without contact around ``td`` [time]; None if there is a contact or it is too short.
 
         Forces do not show whether gravity acts, so gravity is NaN.
         """
@@ -93,7 +93,7 @@ class Touches(NamedTuple):
 def _select_outer_forces(
     forces: Sequence[ContactForce], whole: Momenta
 ) -> list[ContactForce]:
-    """Return the forces whose impulses appear in the model's momentum, in addition to a constant gravity.
+    """Return the forces whose impulses appear in the momentum of the model next to a constant gravity.
 
     An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
     side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces
@@ -130,7 +130,7 @@ def _select_outer_forces(
 
 
 def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
-    """Return the impulses of a force between other times (m,), shape (m - 1, 3)."""
+    """Return the impulses of a force between given times (m,), shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
     return np.diff(
         np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0
@@ -138,7 +138,7 @@ def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
-    """Return True if the internal energy rises in a flight shown by forces: a load without a force acts.
+    """Return True if the internal energy rises in a flight without contact forces, so that some load acts.
 
     In a flight the energy vibrates about its level or falls by damping.
     """

@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# A force is seen if it changes the momentum by this many times the largest deviation in the longest flight.
+# A force acts if it changes the momentum by this many times the largest deviation in the longest flight.
 _SEEN: Final = 4.0
-# A force below this share of the weight is ignored: momenta of the first state are those of half a step before.
+# Smaller forces, as a fraction of the weight, are ignored: the first state has the momenta of half a step earlier.
 _OF_WEIGHT: Final = 0.1
-# States at each end of the longest flight that are left out: the force before or after it may act in them.
+# Number of states left out at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-_FEWEST: Final = 2  # smallest number of intervals between these ends
-# A force that starts and ends within one interval is assumed to act in the middle third of it.
+_FEWEST: Final = 2  # smallest number of intervals that remain
+# A force that acts within a single interval is placed in the middle third of it.
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """Periods in which a force acts: ``spans`` (from, to) [time], each end known within half an ``interval``.
+    """Periods in which a force acts: ``spans`` (from, to) [time], each end known to half an ``interval``.
 
     ``speed`` is the speed of the parts at the end of the longest flight [length/time], None without masses.
     """
@@ -85,7 +85,7 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
 def narrow_to_states(
     time: Samples, tr: float, td: float | None
 ) -> tuple[float, float | None]:
-    """Give the first state from ``tr`` on and the last one up to ``td`` [time], between which a window is judged.
+    """Return the first state at or after ``tr`` and the last state at or before ``td`` [time].
 
     A switch by a contact comes with its first or last force, which is somewhere between two states.  The flight is
     known to the last state without a force.  Where there is no state between them, both times stay.
@@ -102,7 +102,7 @@ def narrow_to_states(
 
 
 def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | None:
-    """Find when the force of a contact or rigid wall acts, by what the solver wrote of it.
+    """Find when the force of a contact or rigid wall acts, from the force that the solver wrote.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
 
 
 def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
-    """Place the ends of a force that acts in the intervals from ``first`` to before ``stop`` of the record.
+    """Return start and end of a force that acts in the intervals from ``first`` up to ``stop`` of the record.
 
     A force that acts in the first interval, or in the last one, is taken to act from its start, or to its end.
     """

@@ -1,4 +1,4 @@
-"""Decide when the parts fly: which source of evidence counts for the window around td in which only gravity acts."""
+"""Decide when the parts fly, from the best source of evidence for the window around td in which only gravity acts."""
 
 from __future__ import annotations
 
@@ -43,19 +43,19 @@ SOURCES: Final = (
 )
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# Work of a load, as a share of the energy, that a flight may show. An energy off by 4 % is a deformation off by 0.02,
-# within which two candidates count as equally good.
+# Largest work of a load in a flight, as a fraction of the energy. An energy error of 4 % is a deformation error of 2 %,
+# and two candidates whose deformations differ by 2 % are ranked as equally good.
 MOST_WORK: Final = 0.04
-# Sources that must show every flight of a better source, since they see the contacts of any part.
+# Sources that must confirm each flight of a better source, since they see the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# Sources that miss some loads: forces that are not written, or fixed walls, which do no work.
+# Sources that cannot see all loads: some forces are not written, and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Two sources show the same end of a flight within this share of it, or this many output intervals.
+# Two sources agree about the end of a flight if they differ by this share of it, or by this many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
 
 
 class Flight(NamedTuple):
-    """A window of free flight [time]; ``start`` is None if unknown, ``end`` None if no next contact was seen.
+    """A window of free flight [time]; ``start`` is None if it is unknown, ``end`` is None if no later contact was seen.
 
     If nothing flies at td, it is the last flight before td, or else the first one after it, and ``refusal`` gives the
     reason.  ``source`` is the evidence for the start, one of `SOURCES`.  ``parts`` are the parts seen to fly together,
@@ -77,7 +77,7 @@ class Flight(NamedTuple):
     described: bool = False
 
     def within(self, time: Samples) -> tuple[float, float]:
-        """Return the flight's window, with the ends of a record at times (n,) in place of unknown ones [time]."""
+        """Return the window of the flight [time]; an unknown end is replaced by the end of the record at times (n,)."""
         first = float(time[0])
         last = float(time[-1])
         return (
@@ -87,17 +87,17 @@ class Flight(NamedTuple):
 
     @property
     def by_parts(self) -> bool:
-        """Return True if the parts' momentum shows the flight, so that contacts elsewhere do not matter."""
+        """Return True if part momenta show the flight, so that contacts of other parts do not matter."""
         return self.source == "momentum" and self.parts is not None
 
     @property
     def unknown_load(self) -> bool:
-        """Return True if a load acts in the flight that may be gravity, a pull or friction, and nothing tells which."""
+        """Return True if a load acts in the flight that may be gravity, a pull or friction."""
         return self.source != "given" and not isfinite(self.gravity)
 
     @property
     def certain(self) -> bool:
-        """Return True if nothing but a free flight looks like this evidence.
+        """Return True if the evidence excludes everything but a free flight.
 
         A fixed rigid wall does no work and has no contact energy.  Without the momentum, only an oscillator that goes
         on swinging distinguishes a flight from a crash into such a wall.
@@ -108,7 +108,7 @@ class Flight(NamedTuple):
 
 
 class Witness(NamedTuple):
-    """A source of evidence: the flight that it shows ``around`` a time, and all its ``flights`` in ascending order.
+    """A source of evidence: its flight ``around`` a given time, and all its ``flights`` in ascending order.
 
     If ``decisive`` is True, a time at which it shows no flight has none, even if it shows no flight anywhere.
     """
@@ -128,7 +128,7 @@ class Witness(NamedTuple):
         *,
         decisive: bool,
     ) -> Witness:
-        """Make a source of evidence over ``time`` (n,) that looks around each time, and for all flights, only once."""
+        """Make a source of evidence over ``time`` (n,) that computes each flight and the list of flights once."""
         once = cache(around)
         return cls(
             source,
@@ -145,18 +145,18 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td: found from the first mark whose flight contains td, else from td."""
+        """Return the flight around td, found from the first search mark in it, or else from td itself."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
-        """Return True if a time at which this source shows no flight has none."""
+        """Return True if the absence of a flight in this source proves that there is none at a time."""
         return self.decisive or bool(self.flights())
 
 
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``, searched from marks that many td share, else from td itself."""
+    """Return the flight around ``td``, searched from marks shared by many td, or else from td itself."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -166,7 +166,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time, found as for a td in its middle, so that listed flights match those used."""
+    """Return the flight around a time as it is found for a td in its middle, as listed flights are."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
@@ -178,7 +178,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Result of the evidence at a td: the flight around it, or the nearest flight and why there is none at td.
+    """Result of the evidence at a td: the flight around it, or the nearest flight and the reason why td is in none.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -191,7 +191,7 @@ class Seen(NamedTuple):
 
 
 def find_seen_flight(history: History, td: float) -> Seen:
-    """Find the free flight around ``td`` [time] from all evidence except the energy of the parts.
+    """Find the free flight around ``td`` [time] from all sources except the internal energy of the parts.
 
     The best source that shows a flight counts.  A better one that shows none at td is never overruled, and neither is
     the contact energy.  If two sources show different ends, the later start and the earlier end count.  Parts that are
@@ -207,7 +207,7 @@ def find_seen_flight(history: History, td: float) -> Seen:
 
 
 def _find_flight_by_evidence(history: History, td: float) -> Seen:
-    """Find the flight around ``td`` from the sources of evidence, without regard to supports."""
+    """Find the flight around ``td`` from the sources of evidence, before supports are considered."""
     flights: list[tuple[str, FreeFlight]] = []
     for witness in list_witnesses(history):
         flight = witness.holding(td)
@@ -226,7 +226,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 
 def _explain_refusal(history: History, witness: Witness, td: float) -> str:
-    """Return the reason why nothing flies at td [time]; the momentum may show a flight and the energy none."""
+    """Return the reason why td [time] is in no flight, also if only the momentum shows one."""
     if witness.source == "momentum":
         from d2rpick.flight.momentum import (
             find_flight_around,
@@ -239,14 +239,14 @@ def _explain_refusal(history: History, witness: Witness, td: float) -> str:
         ):
             contradiction = (
                 f"the momentum is that of free flight at td = {td:.6g}, but the internal "
-                "energy keeps no level"
+                "energy is not that of a free vibration"
             )
-            return f"{contradiction}: parts of the model may touch each other, or energies are wrong"
+            return f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
     return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
 
 
 def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Find all flights that the best source shows and no other denies, with their sources, in ascending order."""
+    """Find all flights of the best source that no other source contradicts, with their sources, in ascending order."""
     sources = list_witnesses(history)
     for rank, witness in enumerate(sources):
         confirmed_flights = []
@@ -281,7 +281,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 
 
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
-    """Return True if a source may deny a flight that a better source shows.
+    """Return True if a source is able to contradict a flight of a better source.
 
     If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
     """
@@ -295,7 +295,7 @@ def list_witnesses(history: History) -> tuple[Witness, ...]:
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Make the history's sources of evidence, best first."""
+    """Compute the sources of evidence of a history, best first."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -362,7 +362,7 @@ def _find_flight_by_energies(
     *,
     level: bool,
 ) -> FreeFlight | None:
-    """Return the flight around td from energies; with ``level`` the internal energy must keep its level in it.
+    """Return the flight around td from energies; with ``level`` the internal energy must stay on one level.
 
     Energies alone do not see a fixed wall, which does no work.
     """
@@ -375,7 +375,7 @@ def _find_flight_by_energies(
             and isinf(flight.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
-            return None  # without gravity nothing feeds the energies
+            return None  # without gravity no work is done on the model
         if not (flight and has_whole_motion(history.balance, flight.start, flight.end)):
             flight = None
     return limit_to_unheld(history.surroundings, flight, history.parts, td)
@@ -384,7 +384,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces; if the energy rises in it, only what keeps its level.
+    """Return the flight around td from contact forces; if the energy rises, only its part on one level.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -409,7 +409,7 @@ def _limit_to_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Return the part of the model's flight in which the internal energy keeps its level, None if td is before it.
+    """Return the part of a flight in which the internal energy stays on one level; None if td is earlier.
 
     ``momenta`` are those that show the flight.
     """
@@ -438,7 +438,7 @@ def _limit_to_level(
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
     if start is not None and start > flight.start and momenta is not None:
-        # without gravity the sum itself; with it the last one, less the work of gravity
+        # without gravity the sum of energies; with gravity the last sum minus the work of gravity
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -451,14 +451,14 @@ def _limit_to_level(
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
-            return None  # opposing forces worked on the model, as on one that is held and moved, and may still act
+            return None  # opposite forces that hold and deform the model do work and may still act
     return flight._replace(start=start)
 
 
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """Return the last flight before ``td``, or else the first one after it, for a td at which nothing flies."""
+    """Return the last flight before ``td``, or else the first flight after it, if td is in no flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (
@@ -468,7 +468,7 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return the name of a source in words."""
+    """Return a description of a source of evidence."""
     return str(source).replace("-", " ")
 
 
@@ -493,7 +493,7 @@ def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> 
                 for n, f in (shown_flights[0], (other_source, flight))
             )
             doubts.append(
-                f"the flight lasts from {first_text}, from {second_text}; the later start and the earlier end count"
+                f"the flight lasts from {first_text}, from {second_text}; the later start and the earlier end are used"
             )
         if flight.end < end:
             end = flight.end
@@ -507,14 +507,14 @@ def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> 
 
 
 def get_agreement_limit(history: History, start: float, end: float) -> float:
-    """Return by how much two sources may differ about the ends of the same flight [time]."""
+    """Return the largest difference between the ends of a flight in two sources that agree [time]."""
     return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 
 def _explain_why_driven(
     history: History, source: str, flight: FreeFlight
 ) -> str | None:
-    """Return the reason why a flight is driven by a load, None if no load works or it may work on other parts."""
+    """Return the reason why a load drives a flight; None if no load does work, or only on other parts."""
     from d2rpick.flight.work import compute_work_beyond_gravity
 
     balance = history.balance
@@ -526,12 +526,12 @@ def _explain_why_driven(
         return None
     return (
         f"the {name_source(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
-        f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: it is driven"
+        f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: a load drives it"
     )
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
-    """Return True if other parts than the flying ones move as well."""
+    """Return True if the model has moving parts that are not among the flying ones."""
     momenta = next(
         (candidate for candidate in history.momenta if candidate.parts is not None),
         None,

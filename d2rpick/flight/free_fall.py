@@ -1,4 +1,4 @@
-"""Fit free fall to a momentum: gravity and damping proportional to mass are all that acts.
+"""Fit a free fall to a momentum, in which only gravity and mass-proportional damping act.
 
 Parts that fly together obey p' = g - alpha p in each component, with constant g and one alpha >= 0, so that p(t) = p0 +
 g t - alpha int p dt, which is linear in p0, g and alpha.
@@ -29,41 +29,41 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 # Gravity on earth in m, inches and feet per second squared; in other units it is a power of ten times one of these.
-# Relative deviation within which an acceleration is gravity: a load comes so close by chance in 1 of 200 cases.
+# An acceleration within this relative deviation is gravity: a load comes so close by chance in 1 of 200 cases.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Rounding that hides this much of the momentum leaves 10 times that open in its change, since damping is fitted too.
+# Rounding that hides a fraction of the momentum hides 10 times that of its change, since damping is fitted too.
 _REACH_OF_DIGITS = 10.0
-# Tolerances for recognising gravity while a load fades: 5 % in size, and a direction cosine of 0.999 along an axis.
+# Tolerances for recognising gravity while a load fades: 5 % in size, direction cosine 0.999 with an axis.
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# Damping that takes 20 % of the momentum in a window is accepted if 5 % of the largest momentum is left.
+# Damping of 20 % of the momentum in a window is accepted if 5 % of the largest momentum remains.
 _DAMPED, _LEFT = 0.2, 0.05
-# Damping takes less than this share of the momentum from one state to the next.
+# Largest share of the momentum that damping takes between two states.
 _SHOWN = 0.1
-# Deviation, as a share of the largest momentum and of its range, allowed in a window without a load other than gravity.
-# A fading load may leave it: from end to end twice as much changes. If only some of the moving parts are tried,
-# TOLERANCE applies: the rest of their body acts on them.
+# Deviation allowed in a window without loads, as a share of the largest momentum and of its range.
+# A fading load may cause this deviation, so the momentum may change by twice as much from end to end.
+# If only some of the moving parts are tried, TOLERANCE applies, because the rest of their body acts on them.
 _ENOUGH = 3e-3
-# Limits for gravity across a load of one direction: bending across the load is within 2 times the rounding, at least 10
-# % of an axis lies across it, and along the load the momentum bends 30 times as much.
+# Limits for gravity across a load of constant direction: the deviation across the load is within 2 times the rounding,
+# an axis has a component of at least 10 % across it, and the deviation along the load is 30 times as large.
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# What acts beside gravity falls to this share from the first to the last third of a window, and to this share of the
-# weight.
+# A fading force falls to this share from the first to the last third of a window,
+# and to this share of the weight at the end.
 _FADED, _LITTLE = 0.6, 0.02
-# A straight motion has less than this share of its momentum across its direction.
+# Largest momentum across the direction of a straight motion, as a share of the momentum.
 _STRAIGHT = 0.01
-# A change of momentum counts as none up to this many times what a window leaves open.
+# A change of momentum is ignored up to this many times the error of a window.
 _UNSEEN = 2.0
-# Relative error of the work of gravity in the energies: states are far apart, and solvers add up by steps.
+# Relative error of the work of gravity in written energies, because of distant states and sums over time steps.
 _OF_WORK = 2e-3
-# A mass that exceeds what momenta and kinetic energies show by this share must have been written.
+# A mass above that from momenta and kinetic energies by this share must have been written by the solver.
 _CLEARLY_HEAVIER = 1e-6
-# Fewest states that show work: twice the number of unknowns.
+# Fewest states for a fit of work: twice the number of unknowns.
 _LEAST_STATES = 6
 
 
 class Laws:
-    """Laws of free flight for one set of parts: gravity and damping act, or nothing at all.
+    """Laws of free flight for one set of parts: only gravity and damping act, or nothing acts at all.
 
     A constant net force does not prove gravity, and a push that fades exponentially looks like damping under such a
     force.  The force is accepted only if it is the mass times one of the deck's accelerations ``gravities`` (0: none
@@ -73,7 +73,7 @@ class Laws:
     def __init__(
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
-        """Prepare the laws for the parts in the columns ``members``; ``balance`` helps where their mass is unknown."""
+        """Prepare the laws for the parts in columns ``members``; ``balance`` gives limits if their mass is unknown."""
         time = momenta.time
         momentum = momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
@@ -91,7 +91,7 @@ class Laws:
         self._given: dict[tuple[float, ...], Constant] = {}
 
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Return the first and last state in free flight around ``td``, and gravity [length/time^2] or None."""
+        """Return the first and last state of the free flight around ``td``, and gravity [length/time^2] or None."""
         window = self._lasting(self.fit, td)
         gravity = self.gravity(*window) if window else None
         if gravity is not None:
@@ -102,12 +102,12 @@ class Laws:
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
-        ):  # a push that balances the weight for a moment is as steady
+        ):  # a push that balances the weight for a moment looks equally steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
-        """Return the acceleration between two states in free flight [length/time^2]: 0 if none is seen, NaN if unknown.
+        """Return the acceleration between two states of a flight [length/time^2]: 0 for none, NaN if it is unknown.
 
         None if what acts there is a brake, or not gravity.
         """
@@ -116,18 +116,18 @@ class Laws:
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law and go on doing so as its limit is lowered."""
+        """Return the states around ``td`` that obey a law, and still obey it under a stricter tolerance."""
         return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
 
     @property
     def _carried(self) -> bool:
-        """Return True if something must carry the parts where no force is seen."""
+        """Return True if a support must carry the parts in a window without visible force."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
-        """Return True if an acceleration is gravity within a relative error."""
+        """Return True if an acceleration equals gravity within a relative error."""
         if self.gravities is None:
             return is_gravity(acceleration, error)
         return any(
@@ -136,7 +136,7 @@ class Laws:
         )
 
     def _braked(self, first: int, last: int) -> bool:
-        """Return True if apparent damping is a brake: faster than the states show, or almost nothing is left."""
+        """Return True if apparent damping is a brake: too fast for the states, or it leaves almost no momentum."""
         largest, final_size = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
@@ -148,7 +148,7 @@ class Laws:
         )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Return the window around ``td`` under a usual acceleration of gravity, in which a load may fade."""
+        """Return the window around ``td`` with a usual acceleration of gravity, in which a load may fade."""
         time = self.fit.time
         momentum = self.fit.momentum
         first, last = self._around(td)
@@ -181,12 +181,12 @@ class Laws:
         )
 
     def _around(self, td: float) -> tuple[int, int]:
-        """Return the states around ``td`` in which a fading or constant load bends the momentum only a little."""
+        """Return the states around ``td`` in which a fading or constant load changes the momentum almost linearly."""
         at = min(int(np.searchsorted(self.fit.time, td)), self.fit.time.size - 1)
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) along an axis, seen across a load of one direction: across it the momentum is straight."""
+        """Yield weights (3,) along an axis that are found in the momentum across a load of constant direction."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -210,7 +210,7 @@ class Laws:
                     yield size * axis
 
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) usual in decks that are about as large as the mean force between two states."""
+        """Yield the usual weights (3,) that are close to the mean force between two states."""
         time = self.fit.time[first : last + 1]
         slope = (
             np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0]
@@ -228,7 +228,7 @@ class Laws:
             )
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
-        """Return True if the force in a window beside the ``weight`` (3,) fades, and is small at the end."""
+        """Return True if the force in a window, minus the ``weight`` (3,), fades and is small at the end."""
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
@@ -240,7 +240,7 @@ class Laws:
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
-        """Return the acceleration in a window [length/time^2]: 0 if none is seen, None if it is not that of gravity.
+        """Return the acceleration in a window [length/time^2]: 0 if none is seen, None if it is not gravity.
 
         NaN if neither the mass nor the work tells.
         """
@@ -257,7 +257,7 @@ class Laws:
             return None if self._slowed(window, vector) else force / mass
         if (
             self.velocity
-        ):  # the change of a velocity is an acceleration, so no mass is missing
+        ):  # an acceleration is the change of a velocity, so the mass is not needed
             return None
         gravity = None
         if self.balance is not None:
@@ -275,7 +275,7 @@ class Laws:
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
-        """Return True if a force may be gravity on more mass than the kinetic energy shows, which is a lower bound.
+        """Return True if a force may be gravity on a larger mass than the lower bound from the kinetic energy.
 
         At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
         energy swings.
@@ -296,7 +296,7 @@ class Laws:
         )
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
-            return False  # the mass is written
+            return False  # the solver wrote the mass
         swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
         largest = force / self.mass
         lightest = largest * (1 - swing / float(kinetic[best]))
@@ -306,7 +306,7 @@ class Laws:
         )
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
-        """Return True if a constant force (3,) is friction rather than gravity: it only slows the parts down.
+        """Return True if a constant force (3,) is friction rather than gravity, because it only slows the parts down.
 
         Its size may be that of gravity by chance, or because the coefficient of friction is 0.1.  Therefore gravity
         must act along an axis, and in a straight motion with its value in m, mm, s or ms.
@@ -331,8 +331,10 @@ class Laws:
 
     @cached_property
     def fall(self) -> bool:
-        """Return True if gravity moves the parts at some time; where it does not show then, something carries them."""
-        self.fall = False  # `fall` is read while it is computed
+        """Return True if gravity moves the parts at some time; otherwise something supports them."""
+        self.fall = (
+            False  # preliminary value, because `fall` is used while it is computed
+        )
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in list_moments(self.fit.time))
@@ -344,7 +346,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Return True if gravity shows across the direction of a load at some time."""
+        """Return True if gravity is seen across the direction of a load at some time."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
@@ -355,7 +357,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield values of gravity about as large as an acceleration: ``known`` ones, or those usual in decks."""
+    """Yield values of gravity close to an acceleration: ``known`` values, or the usual ones."""
     if known is not None:
         yield from (
             gravity
@@ -370,7 +372,7 @@ def _list_gravities_near(
 
 
 def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> bool:
-    """Return True if an acceleration [length/time^2] is gravity on earth in consistent units, within a relative error.
+    """Return True if an acceleration [length/time^2] equals gravity on earth within a relative error.
 
     Units of length and time change it by powers of ten, ``decades`` at a time.
 
@@ -391,7 +393,7 @@ def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> 
 def find_acceleration_by_work(
     balance: Balance, time: Samples, momentum: Samples, start: float, end: float
 ) -> float | None:
-    """Return the acceleration at which the work on a momentum grows [length/time^2].
+    """Return the acceleration that explains the work done on a momentum [length/time^2].
 
     The work is the external work, else kinetic plus internal energy.
 
@@ -439,20 +441,22 @@ class FreeFall(Law):
         self.integral = integrate_by_trapezia(time, momentum)
         self._both = np.asfortranarray(
             np.hstack([momentum, self.integral])
-        )  # contiguous columns, since windows are long
+        )  # contiguous columns are faster for long windows
 
     def _misfit(self, first: int, last: int) -> float:
-        if last - first < 3:  # three parameters per component fit any three states
+        if (
+            last - first < 3
+        ):  # three parameters per component fit any three states exactly
             return 0.0
         p, impulse, alpha = self._fitted(first, last)
         return float(np.abs(p + alpha * impulse).max())
 
     def damping(self, first: int, last: int) -> float:
-        """Return the least-squares alpha between two states [1/time]."""
+        """Return the least-squares damping rate alpha between two states [1/time]."""
         return self._fitted(first, last)[2]
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
-        """Return the least-squares g between two states, by default all, shape (components,) [momentum/time]."""
+        """Return the least-squares gravity between two states, by default all, shape (components,) [momentum/time]."""
         last %= self.time.size
         states = slice(first, last + 1)
         undamped = (

@@ -1,4 +1,4 @@
-"""Find flights from the internal energy, alone for want of better evidence, and beside the energies of the whole model.
+"""Find flights from the internal energy if better evidence is missing, and refine those from the model's energies.
 
 Alone it is poor evidence and never certain: a mild contact may leave no trace in it.  So the window begins late, and
 ends early if a contact is seen.
@@ -24,45 +24,45 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Widening of the band of energies before td, since the band has not seen all of a vibration.
+# Widening of the energy band before td, since the band may not contain a complete vibration.
 _BAND_RESERVE: Final = 0.25
-# Share of the time to td that is left unused: in 45 computed runs the energy fell into its band up to 0.3 of that time
-# too early, while the last pushes of the load still came.
+# Share of the time before td that is not used for the band. In 45 computed runs the energy entered its band too early,
+# by up to 0.3 of that time, while the load still acted.
 _WAIT: Final = 1 / 3
-# A contact leaves 10 % of the lowest and highest energies for a moment, and moves the energy at least twice as fast as
-# the vibration in the last quarter before td; a decaying vibration was less than twice as fast before.
+# A contact leaves the central 80 % of the energy range for a moment. It changes the energy at least twice as fast
+# as the vibration does in the last quarter before td; a decaying vibration stays below that rate.
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # The level is the mean over this share of the quiet time; it changes if it leaves its band, widened by its width.
 _LEVEL: Final = 1 / 8
-# A landing is seen against this share of the time before it, if the energy has turned at least 4 times in it.
+# A landing is detected from this share of the time before it, if the energy has turned at least 4 times there.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Below this share of the largest energy, an energy is round-off: tables and single precision have seven digits.
+# Smaller energies, as a fraction of the largest one, are round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# The energy band of a flight's last quarter, widened by this share of its width, contains all earlier energies.
+# The energy band of the last quarter of a flight, widened by this share of its width, contains all earlier energies.
 _RESERVE: Final = 0.5
-# The means of the last two quarters differ by less than this share of the band. A steady drift differs by 1, a
-# vibration that shows 3/4 of a period in each quarter by 0.3.
+# The means of the last two quarters differ by less than this share of the band.
+# A steady drift gives 1, a vibration with 3/4 of a period in each quarter gives 0.3.
 _DRIFT: Final = 0.35
-# A slow vibration has at least this many swings by half of the range, and ranges and means of both halves that agree to
-# this share; a crash ends after one swing.
+# A slow vibration has at least this many oscillations with half of the range.
+# Ranges and means of both halves agree to this share; a crash ends after one oscillation.
 _SWINGS: Final = 4
 _ALIKE: Final = 0.75
-# An energy that falls below 5 % of its peaks is that of one vibration, which is at rest at the peaks. Beside a
-# permanent deformation a swing of 0.1 % counts as none.
+# An energy that falls below 5 % of its peaks belongs to one vibration, which is at rest at the peaks.
+# Next to a permanent deformation an oscillation of 0.1 % is ignored.
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# A body yields in its first swing if its energy rises by 90 % of the way to its later level, and is within 10 % of its
-# minimum for no longer than it takes to rise from there (a harmonic swing: 0.7 of that).  Bodies of the model that hit
-# each other later in the flight leave the energy at its minimum for longer.
+# A body yields in its first oscillation if its energy rises by 90 % of the way to its later level.
+# The energy must also leave its minimum, within 10 %, as fast as it rises from there (harmonic: 0.7 of that time).
+# If bodies of the model collide later in the flight, the energy stays at its minimum for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
-# The motion gives that energy: the sum of both rises by no more than this share of it.  It may fall, by damping.
+# The motion supplies that energy: the sum of both rises by at most this share of it, and may fall by damping.
 _NOT_FROM_MOTION: Final = 0.1
 
 
 class QuietTime(NamedTuple):
-    """A window in which the energy shows no load; ``end`` is None if no next contact is seen [time].
+    """A window in which the energy shows no load [time]; ``end`` is None if no later contact is seen.
 
     ``settled`` is the time when the energy had settled; the time from there to ``start`` is left unused for safety.
     """
@@ -73,7 +73,7 @@ class QuietTime(NamedTuple):
 
 
 def find_quiet_time(history: History, td: float) -> QuietTime | None:
-    """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
+    """Find the window around ``td`` [time] in which the energy stays in its band on one level; None without any."""
     start = float(history.time[0])
     rounding = round_off(history)
     energy_before = history.between(start, td)[1]
@@ -105,7 +105,7 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time after ``start`` [time] at which the energy bursts out of its former range, or None.
+    """Return the first time after ``start`` at which the energy leaves its former range quickly [time], or None.
 
     It is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's width: no
     vibration goes so far beyond its range of so long a time.
@@ -135,7 +135,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the last time before td at which the energy falls into its band: the end of the load [time].
+    """Return the last time before td at which the energy enters its band, as the end of the load [time].
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
@@ -160,7 +160,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, start: float, td: float) -> float:
-    """Return the last time from ``start`` to td at which the energy is far from where it stays most of the time."""
+    """Return the last time from ``start`` to td at which the energy is far from its usual values."""
     time, energy = history.between(start, td)
     if time.size < FEWEST:
         return start
@@ -170,7 +170,7 @@ def _find_last_excursion(history: History, start: float, td: float) -> float:
 
 
 def _find_last_push(history: History, start: float, td: float) -> float:
-    """Return the last time from ``start`` to td at which the energy changes much faster than just before td."""
+    """Return the last time from ``start`` to td at which the energy changes much faster than shortly before td."""
     inside = find_window(history.time, start, td)
     time = history.time[inside]
     if time.size < FEWEST:
@@ -188,7 +188,7 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, start: float, td: float) -> float | None:
-    """Return the first time after ``td`` at which the energy rises above its band from ``start`` to td, or None."""
+    """Return the first time after ``td`` at which the energy exceeds its band from ``start`` to td, or None."""
     top = _widen_band(history.between(start, td)[1], _BAND_RESERVE)[1]
     time, energy = history.between(np.nextafter(td, np.inf), np.inf)
     above = np.flatnonzero(energy > top)
@@ -196,7 +196,7 @@ def _find_burst(history: History, start: float, td: float) -> float | None:
 
 
 def _find_change_of_level(history: History, start: float, td: float) -> float | None:
-    """Return the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
+    """Return the first time after ``td`` at which the mean energy leaves its band before td, or None."""
     inside = find_window(history.time, start, td)
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:
@@ -205,7 +205,7 @@ def _find_change_of_level(history: History, start: float, td: float) -> float | 
     means = (sums[width:] - sums[:-width]) / width
     first_after = (
         inside.stop - inside.start
-    )  # the first mean whose states all lie after td
+    )  # index of the first mean with all its states after td
     low, high = _widen_band(means[: first_after - width + 1], 1.0)
     outside = np.flatnonzero((means[first_after:] < low) | (means[first_after:] > high))
     if outside.size:
@@ -220,14 +220,14 @@ def _sum_energies(history: History) -> Samples:
 
 
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
-    """Return the band of some values, widened on both sides by a share of its width."""
+    """Return the band of some values, widened at both ends by a share of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 
 
 @remember
 def round_off(history: History) -> float:
-    """Return the energy below which an internal energy is round-off beside the energies of the run [energy]."""
+    """Return the energy below which an internal energy is round-off compared with the energies of the run [energy]."""
     balance = history.balance
     terms: list[Samples | None] = []
     if balance:
@@ -237,7 +237,7 @@ def round_off(history: History) -> float:
 
 
 def find_largest(*terms: Samples | None) -> float:
-    """Return the largest absolute value of some energies, which may be missing or empty; 0 without any [energy]."""
+    """Return the largest absolute energy; missing arrays are skipped, and 0 is returned without any [energy]."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
@@ -252,7 +252,7 @@ def find_settled_time(
     end: float,
     unseen: float = 0.0,
 ) -> float | None:
-    """Return the time in a window from which an internal energy keeps its level, None if it drifts to the end.
+    """Return the time in a window from which an internal energy stays on one level; None if it drifts to the end.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def rises_as_it_yields(
     settled: float,
     end: float,
 ) -> bool:
-    """Whether an internal energy rises at the start of a flight as a vibrating body yields.
+    """Return True if an internal energy rises at the start of a flight because a vibrating body yields.
 
     What is deformed for good stays in the internal energy, so that it rises at once to the level that it keeps later.
 
@@ -334,14 +334,14 @@ def rises_as_it_yields(
 
 
 def _sum_later_losses(damped: Samples) -> Samples:
-    """Return what damping takes from each state to the mean of the last quarter, in the most damped energy, (n,)."""
+    """Return the energy that damping takes between each state and the middle of the last quarter, shape (n,)."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
 
 
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
-    """Return the first state from which an energy keeps the level of its last quarter, None if that drifts.
+    """Return the first state from which an energy stays on the level of its last quarter; None if that drifts.
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """
@@ -364,7 +364,7 @@ def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None
 
 
 def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
-    """Return True if an energy swings slowly about one level: by half of its range, alike in both halves."""
+    """Return True if an energy oscillates slowly about one level, by half of its range and alike in both halves."""
     width = float(np.ptp(energy))
     if width <= least:
         return True
@@ -400,7 +400,7 @@ def _count_large_swings(energy: Samples, least: float) -> int:
 
 
 def has_whole_motion(balance: Balance, start: float, end: float) -> bool:
-    """Return True if more moves in a window than the vibration that the internal energy shows."""
+    """Return True if a window contains more motion than the vibration that the internal energy shows."""
     inside = find_window(balance.time, start, end)
     if (
         balance.kinetic is None

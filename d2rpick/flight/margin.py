@@ -1,4 +1,4 @@
-"""Compute the margin that td keeps before the contact that ends a flight."""
+"""Compute the margin between td and the contact that ends a flight."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 LEAST_MARGIN: Final = 0.03
 # Fewest states in which a force is looked for.
 _FEWEST: Final = 3
-# A contact grazes the body if its force stays below this share of the largest force on the body, or if it has changed
-# the momentum by less than this share of the momentum towards it when it is over.  The surfaces then move along each
-# other, so that a body that is a little out of place touches much earlier.  At a landing that stops the surface, even a
-# slender body takes a fourth of that momentum at its tip; in computed cars and boxes landings took 0.27 and more of it
-# within the margin, the grazing contact of a car 0.02.
+# A contact grazes the body if its force stays below this share of the largest force on the body,
+# or if it changes the momentum by less than this share of the momentum towards it.
+# The surfaces then slide along each other, so a small position error moves the contact to a much earlier time.
+# A landing takes more: 1/4 at the tip of a slender body, at least 0.27 within the margin in computed cars and boxes.
+# The grazing contact of a computed car took 0.02.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 
@@ -50,7 +50,7 @@ def compute_margin(
     place: float | None = None,
     turning: float = 0.0,
 ) -> Margin:
-    """Return the margin before the contact that ends a flight: the given one, else by how much it may come earlier.
+    """Return the margin before the contact that ends a flight: the given one, or else how much earlier it may come.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 
@@ -90,7 +90,7 @@ def compute_margin(
 def estimate_landing_spread(
     history: History, flight: Flight, place: float | None, turning: float = 0.0
 ) -> float | None:
-    """Return how far a switch may move the next landing, from its velocity error and the body's place error [time].
+    """Return how far a switch may move the next landing, by its velocity error and its position error [time].
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
@@ -110,7 +110,7 @@ def estimate_landing_spread(
 def estimate_grazing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    r"""Return how much earlier a grazing contact may come [time]: infinite without gravity, None if no error is known.
+    r"""Return how much earlier a grazing contact may come [time]: infinite without gravity, None if unknown.
 
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
@@ -131,7 +131,7 @@ def estimate_grazing_spread(
 
 
 class _Contact(NamedTuple):
-    """Momentum of a body and force on it less gravity, at the ``time`` of all states (n,), with gravity itself.
+    """Momentum of a body, the force on it without gravity, and gravity, at the ``time`` of all states (n,).
 
     ``begin`` is the last state before the contact that ends the flight.
     """
@@ -164,7 +164,7 @@ def _find_contact(history: History, flight: Flight) -> _Contact | None:
 
 
 def is_grazing(history: History, flight: Flight, within: float) -> bool:
-    """Whether the contact that ends a flight stays below 1 % of the largest force for a time ``within`` [time].
+    """Return True if the contact that ends a flight stays below 1 % of the largest force for ``within`` [time].
 
     False if the record ends before that, or momenta do not show the force.
     """
@@ -182,7 +182,7 @@ def is_grazing(history: History, flight: Flight, within: float) -> bool:
 
 
 def changes_momentum_little(history: History, flight: Flight) -> bool:
-    """Whether the contact that ends a flight is over with less than 10 % of the momentum towards it.
+    """Return True if the contact that ends a flight takes less than 10 % of the momentum towards it.
 
     It is over when its force stays below 1 % of the largest one for three states.  The impulse is the change of
     momentum less gravity.  False if the record ends before that, or momenta do not show the force.
@@ -292,7 +292,7 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
 
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
-    """Return the momentum of the flying parts in the flight, shape (k, 3 or 1); None if unknown or others move."""
+    """Return the momentum of the flying parts, shape (k, 3 or 1); None if unknown or other parts move too."""
     momentum_of_body = _select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -321,7 +321,7 @@ def _select_momenta_of_flight(
 
 
 def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
-    """Return the unit vector (3,) along which gravity changes the momentum in a flight, without gravity that of motion.
+    """Return the unit vector (3,) of gravity in a flight; if there is no gravity, that of the motion.
 
     None if the momentum is not written, or nothing moves.
     """
@@ -340,7 +340,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 
 
 def _compute_closing_speed(history: History, flight: Flight) -> float | None:
-    """Return the speed along gravity at the end of a flight, without gravity the speed [length/time], or None."""
+    """Return the speed along gravity at the end of a flight, or the total speed without gravity; else None."""
     momentum_of_body = _select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -356,7 +356,7 @@ def _compute_closing_speed(history: History, flight: Flight) -> float | None:
 
 
 def _compute_share_towards_ground(momentum: Samples) -> float:
-    """Return the share of the kinetic energy at the end of a flight that belongs to the motion along gravity [-]."""
+    """Return the share of the final kinetic energy that belongs to motion along gravity [-]."""
     last = momentum[-1]
     change = momentum[-1] - momentum[0]
     if not change.any():

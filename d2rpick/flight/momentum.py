@@ -1,4 +1,4 @@
-"""Find which parts fly together, from their momenta, and when.
+"""Find which parts fly together, and when, from their momenta.
 
 A part alone does not fly freely while another part is attached to it and vibrates against it, so the set of parts that
 flies is searched as well.
@@ -35,24 +35,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A momentum that changes by less than this share of itself is constant: single precision has seven digits.
+# A momentum is constant if its relative change is smaller: single precision has seven digits.
 _CONSTANT = 1e-6
-# If a momentum is constant within its printed digits, the chosen parts must move by this many times their rounding.
+# If a momentum is constant within its printed digits, the chosen parts must move by this many times the rounding.
 _VISIBLE = 100
-# A set with more parts is preferred only if its window is longer by this factor: a part with a large momentum of its
-# own, such as a sled, loosens the tolerance for the others.
+# A larger set of parts is preferred only if its window is longer by this factor.
+# A part with a large momentum of its own, such as a sled, loosens the tolerance for the other parts.
 _LONGER = 1.1
-# Attached parts are searched in this share of the record before td, on at most this many states; the bending of a
-# body's momenta cancels up to this share, given by rounding and the solver's own errors.
+# Attached parts are searched in this share of the record before td, on at most this many states.
+# The momenta of a body deviate together from a line by less than the third value: rounding and solver errors.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# A sum that becomes smaller by less than this share does so by rounding; without this limit, a part of almost no mass
-# would be added and removed for ever.
+# A sum that decreases by less than this share decreases by rounding.
+# Without this limit a part of almost no mass would be added and removed for ever.
 _ROUNDED: Final = 1e-9
-# A set that ends no faster than this share of its largest momentum stands still, or is held.
+# A set of parts is at rest or held if its final speed is below this share of its largest momentum.
 _HELD = 0.01
-# The momenta of parts add up to that of the model within this share, or a rigid body has taken some of them.
+# The part momenta add up to that of the model within this share, unless a rigid body has taken some parts.
 _ALL_OF_IT: Final = 1e-2
-# A body flies by itself for at least this share of the record, at a velocity that differs from the set's by this share.
+# A body flies separately for at least this share of the record, with a velocity that differs by this share.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"
@@ -60,14 +60,14 @@ ALL: Final = "all"
 
 
 def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
-    """Return the momenta that may show a flight, best first: all, or only the set that was named to fly."""
+    """Return the momenta that may show a flight, best first: all, or only the named set of flying parts."""
     return [candidate for candidate in momenta if candidate.flying] or momenta
 
 
 def find_flight_around(
     momenta: Momenta, td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
-    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
+    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and its window.
 
     Unless the set is given, the chosen parts are tried, these with the parts that move most against them, and all
     parts.
@@ -103,7 +103,7 @@ def find_flight_around(
 def _limit_to_flights_of_bodies(
     momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight
 ) -> FreeFlight | None:
-    """Return the part of a set's flight in which each body flies: colliding bodies keep their common momentum."""
+    """Return the part of a flight in which each body flies: bodies in collision keep their total momentum."""
     for part in find_bodies_apart(momenta, members):
         alone = find_flight_of(momenta, (part,), td)
         if alone is None:
@@ -128,7 +128,7 @@ def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
 
 
 def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
-    """Find the parts among ``members`` that fly by themselves, see `bodies_apart`."""
+    """Find the parts among ``members`` that fly separately, see `find_bodies_apart`."""
     mass = momenta.mass(members)
     masses = momenta.masses
     if (
@@ -150,7 +150,7 @@ def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[i
             momenta.values[:, part] / masses[part] - velocity, axis=1
         )
         if float(spans[relative > room].sum()) <= least_time:
-            continue  # no flight of this part could count
+            continue  # a flight of this part would be too short to matter
         apart = (
             flight.end - flight.start
             for flight in _find_flights_of_part(momenta, part)
@@ -172,7 +172,7 @@ def _find_flights_of_part(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]
 def find_flight_of(
     momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
-    """Find the window around ``td`` in which these parts together fly freely, or None."""
+    """Find the window around ``td`` in which the given parts together fly freely; None if there is none."""
     time = momenta.time
     momentum = momenta.of(members)
     if time.size < FEWEST or not time[0] <= td <= time[-1]:
@@ -199,7 +199,7 @@ def find_flight_of(
     if states is None or (
         not gravity and gravities is None and _has_falling_part(momenta)
     ):
-        return None  # a part that does not fall with the others is carried
+        return None  # a part that does not fall with the others is supported
     first, last = states
     inside = momentum[first : last + 1]
     if (
@@ -208,7 +208,7 @@ def find_flight_of(
     ):
         steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
-            return None  # held, or at rest
+            return None  # the parts are held or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return limit_to_unheld(momenta.surroundings, flight, parts, td)
@@ -217,7 +217,7 @@ def find_flight_of(
 def get_laws_of(
     momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
 ) -> Laws:
-    """Return the laws of free flight for a set of parts, made once for all td."""
+    """Return the laws of free flight for a set of parts, computed once for all td."""
     if momenta.parts is None or np.isnan(momenta.mass(members)):
         whole = balance
     else:
@@ -244,14 +244,14 @@ def _has_falling_part(momenta: Momenta) -> bool:
 def find_all_flights(
     momenta: Momenta, balance: Balance | None = None
 ) -> tuple[FreeFlight, ...]:
-    """Find all windows of free flight of the chosen parts and the parts that fly with them, in ascending order."""
+    """Find all free flights of the chosen parts and the parts that fly with them, in ascending order."""
     return find_all_windows(
         momenta.time, partial(find_flight_around, momenta, balance=balance)
     )
 
 
 def can_deny_flight(momenta: Momenta) -> bool:
-    """Return True if the chosen parts, or the model, move enough for their momentum to show that they do not fly."""
+    """Return True if the chosen parts or the model move enough for their momentum to exclude a flight."""
     change = momenta.change(momenta.chosen)
     return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(
         momenta.chosen
@@ -259,7 +259,7 @@ def can_deny_flight(momenta: Momenta) -> bool:
 
 
 def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
-    """Return True if a constant momentum, known up to ``noise``, shows that the chosen parts fly and are not at rest.
+    """Return True if a constant momentum with error ``noise`` shows motion rather than rest of the chosen parts.
 
     Heavy parts print coarse numbers, which may hide a load on the chosen parts.  If the chosen parts have no mass, as
     springs, the members of the set count instead.
@@ -274,7 +274,7 @@ def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) ->
 
 
 def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts to try: the chosen parts, these with attached parts, and all moving parts.
+    """Yield the sets of parts to try: the chosen parts, the chosen and attached parts, and all moving parts.
 
     If all parts are chosen, the user chose none; then parts that something carries are left out.
     """
@@ -317,7 +317,7 @@ def _find_attached_parts(
         return ()
     wider = (
         len(moving) > rests.shape[1]
-    )  # otherwise all left vectors are there, and the right ones are many
+    )  # the full set of left vectors would be large; only the right ones are used
     left_vectors, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
@@ -334,7 +334,7 @@ def _find_attached_parts(
 def _refine_attached_parts(
     rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]
 ) -> tuple[int, ...]:
-    """Add or leave out single parts as long as this makes the bending of the sum, (parts, k), smaller."""
+    """Add or remove single parts as long as the summed deviation (parts, k) becomes smaller."""
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
     while free:
@@ -349,7 +349,7 @@ def _refine_attached_parts(
 
 
 def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection:
-    """Replace the words ``flying`` and ``all`` in a selection of parts by the part ids that they stand for.
+    """Replace the words ``flying`` and ``all`` in a selection of parts by part ids.
 
     A part with such a title takes precedence over the word.
 
@@ -376,23 +376,23 @@ def replace_words_by_part_ids(run: OpenedRun, selection: Selection) -> Selection
 
 
 def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
-    """Return the parts that ever have internal energy; raise FormatError if there are none."""
+    """Return the parts that have internal energy at some time; raise FormatError if there are none."""
     parts = run.parts
     energies = run.part_energies(
         parts
-    )  # raises an error that gives the reason if there are none
+    )  # raises an error with the reason if there are none
     with_energy = tuple(
         part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
     )
     if not with_energy:
         raise FormatError(
-            f"{run.name}: no part ever has internal energy; name the parts to be switched"
+            f"{run.name}: no part ever has internal energy; name the switched parts with `parts`"
         )
     return with_energy
 
 
 def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
-    """Return the deformable parts that fly as one body; raise FormatError if momenta do not show them.
+    """Return the deformable parts that fly as one body; raise FormatError if the momenta do not show them.
 
     Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
     car, which is the body to be switched.  The parts that the deck connects are tried; without a deck, or if none of
@@ -412,7 +412,7 @@ def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
-    """Return the deformable parts that momenta show to fly together, in one or more bodies; raise FormatError without.
+    """Return the deformable parts that fly together in one or more bodies; raise FormatError without any.
 
     All parts are tried together, then each part that is in no set yet, with the parts attached to it.
     """
@@ -429,7 +429,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield sets of parts that are attached to the heaviest part at some time, without parts that slide then.
+    """Yield sets of parts attached to the heaviest part at some time, without the parts that slide then.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
@@ -449,20 +449,20 @@ def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
         )
         if (
             len(core) <= len(attached) and core not in sets
-        ):  # the set with all of them was tried before
+        ):  # the complete set was tried before
             sets.add(core)
             yield core
 
 
 def _is_sliding(momenta: Momenta, part: int, td: float) -> bool:
-    """Return True if a part is seen to move under a constant force around ``td`` [time] that is not gravity."""
+    """Return True if a part moves under a constant force other than gravity around ``td`` [time]."""
     laws = get_laws_of(momenta, (part,))
     straight = find_lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
     return straight is not None and find_flight_of(momenta, (part,), td) is None
 
 
 def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | None]:
-    """Return the deformable parts and their momenta, None if the run has no momenta of parts."""
+    """Return the deformable parts and their momenta; None if the run has no part momenta."""
     deformable = list_deformable_parts(run)
     return deformable, next(
         (candidate for candidate in run.momenta(deformable, None) if candidate.parts),
@@ -473,7 +473,7 @@ def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | 
 def _list_flights_of_bodies(
     momenta: Momenta, bodies: Iterable[Iterable[int]]
 ) -> Iterator[FreeFlight]:
-    """Yield the flights of connected parts, given by their ids."""
+    """Yield the flights of bodies of connected parts, given by part ids."""
     position_by_id = {
         part.id: position for position, part in enumerate(momenta.parts or ())
     }
@@ -492,7 +492,7 @@ def _select_heaviest_parts(
     """Return the deformable parts of the flight with the largest product of mass and time."""
     if not found or momenta is None:
         raise FormatError(
-            f"{run.name}: no momenta show which parts fly together; name the parts to be switched"
+            f"{run.name}: no momenta show which parts fly together; name the switched parts with `parts`"
         )
     if momenta.masses is None:
         masses = np.ones(len(run.parts))
@@ -511,7 +511,7 @@ def _select_heaviest_parts(
 def find_complete_stretches(
     momenta: Momenta, whole: Momenta | None
 ) -> tuple[slice, ...]:
-    """Return the ranges of states in which the momenta of parts add up to that of the ``whole`` model.
+    """Return the ranges of states in which the part momenta add up to that of the ``whole`` model.
 
     In the other states a rigid body has taken some of them, and no quantity of a part is used.
     """
@@ -521,7 +521,7 @@ def find_complete_stretches(
 def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return for each state (n,) whether the momenta of the parts add up to that of the whole model.
+    """Return an array (n,) that is True if the part momenta add up to that of the whole model.
 
     ``before`` is the largest momentum of the whole model in earlier states.
     """

@@ -1,4 +1,4 @@
-"""Compute how far a body is out of place at td because some of its parts were frozen elsewhere.
+"""Compute the position error of a body at td that arises because its moving parts were frozen in another position.
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
@@ -35,24 +35,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Rotations are fitted on at most this many states; displacements use all of them.
+# Most states on which rotations are fitted; displacements use all states.
 _STATES: Final = 200
-# The relative velocity of a loose part changes by less than this share; that of a part of a body changes by more if the
-# body turns by 0.01 degrees.
-# body turns by a hundredth of a degree, that of its parts changes by more.
+# Largest relative change of the relative velocity of a loose part.
+# For a part of a body it changes by more if the body turns by 0.01 degrees.
 _STEADY: Final = 1e-4
-# Bending of the other parts, relative to the part's motion, above which the error is a lower bound. In computed cars
-# with right errors it was at most 0.24, in a public car with an error 3 and 4 times too small 1.1 and 1.4.
+# Deformation of the other parts, relative to the motion of the part, above which the error is a lower bound.
+# In computed cars with right errors it was at most 0.24; in a public car with errors 3 to 4 times too small 1.1 to 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
-# An error below this share of the limit may be three times as large and still be small: the body stays in place.
+# Errors below this share of the limit are negligible even if they are three times as large.
 _HARDLY: Final = 0.01
-# A body is out of place if its error exceeds this share of its path: 1/3 of the margin before a contact, 3 % of the
-# flight, within which landings of computed runs moved.
+# Largest position error as a share of the path of the body. It is 1/3 of the margin before a contact,
+# which is 3 % of the flight, the range in which landings of computed runs moved.
 MOST_OF_PATH: Final = 0.01
 
 
 class Drift:
-    """Displacement of a body over the flight, due to parts that move against it; differences from tr to td count.
+    """Displacement of a body over the flight caused by parts that move relative to it, as differences from tr to td.
 
     Attributes
     ----------
@@ -107,7 +106,7 @@ class Drift:
         return self.turning.doubt > float(np.sqrt(np.mean(angles**2)))
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Return the distances of the body from its right place at td, for tr (k,) [length]; NaN outside the flight.
+        """Return the position errors of the body at td, for tr (k,) [length]; NaN outside the flight.
 
         If the deck shows how the body turns, the largest distance at the watched nodes is used, else that of the centre
         of mass.
@@ -121,7 +120,7 @@ class Drift:
         return self._inside(tr, td, place_at_td[:-1] - place_at_td[-1])
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """Return by how much the body is turned at td, for times tr (k,) [degrees]; NaN if unknown."""
+        """Return the rotation errors of the body at td, for tr (k,) [degrees]; NaN if unknown."""
         if self.turning is None:
             turned = np.full((tr.size, 3), np.nan)
         else:
@@ -139,12 +138,12 @@ class Drift:
 
     @cached_property
     def limit(self) -> float:
-        """Return the error above which the body is out of place [length]."""
+        """Return the largest acceptable position error [length]."""
         return MOST_OF_PATH * float(self.path[-1])
 
 
 def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None:
-    """Find the displacement of a body in flight against the place of a rigid one.
+    """Find the displacement of a body in flight relative to a rigid body.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
     a constant rate; together they have at most half of the mass.
@@ -183,7 +182,7 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # parts without a known place are left out: the error would be too small otherwise
+    )  # parts with unknown position are left out: the error would be too small otherwise
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -209,7 +208,7 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
 def _integrate_displacements(
     time: Samples, velocity: Samples, mass: Samples
 ) -> tuple[Samples, Samples]:
-    """Return the displacements of parts (n, parts, 3) against their centre of mass, and its path (n,) [length]."""
+    """Return the displacements of parts (n, parts, 3) from their centre of mass, and its path (n,) [length]."""
     centre = np.average(velocity, axis=1, weights=mass)
     ways = integrate_by_trapezia(
         time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)
@@ -238,7 +237,7 @@ def find_drift_in_flight(
     parts: Sequence[Part] | None = None,
     placement: Placement | None = None,
 ) -> Drift | None:
-    """Find the displacement of the body that ``parts``, or the parts to be switched, become in a flight.
+    """Find the displacement in a flight of the body that consists of ``parts``, or of the parts to be switched.
 
     None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
     """
@@ -249,7 +248,7 @@ def find_drift_in_flight(
 def find_parts_apart(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return those of ``parts``, or of the parts to be switched, that fly away from the others: nothing joins them.
+    """Return those of ``parts``, or of the parts to be switched, that separate from the others in the flight.
 
     The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
@@ -285,7 +284,7 @@ def find_parts_apart(
 def _collect_flying(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
-    """Collect the input of a drift; None if the momenta of single parts do not show the flight."""
+    """Collect the input of a drift; None if the part momenta do not show the flight."""
     momenta = next(
         (candidate for candidate in history.momenta if candidate.parts is not None),
         None,
@@ -327,7 +326,7 @@ class RigidBody(NamedTuple):
 
 
 class Off(NamedTuple):
-    """Place error of the body that is displaced most [length], and its cause; ``body`` is named if there are several.
+    """Largest position error of a body [length], and its cause; ``body`` is named if there are several bodies.
 
     ``assumed`` is True if no deck shows that the parts become one body.  ``at_least`` is True if the error may be
     larger.
@@ -341,12 +340,12 @@ class Off(NamedTuple):
 
     @property
     def part(self) -> str | None:
-        """Return the name of the part that is frozen elsewhere, None if there is none."""
+        """Return the name of the part that is frozen in another position; None if there is none."""
         return self.drift.part.name if self.error > 0 else None
 
 
 class Bodies:
-    """Rigid bodies of a flight with their displacements; ``told`` are those of a deck, none if one body is assumed.
+    """Rigid bodies of a flight with their displacements; ``told`` are those of a deck, empty if one body is assumed.
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them.
@@ -368,14 +367,14 @@ class Bodies:
         )
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Return the place error of the most displaced body at td, for tr (k,) [length]; NaN outside the flight."""
+        """Return the position error of the most displaced body at td, for tr (k,) [length]; NaN outside the flight."""
         if self._complete:
             return np.asarray(self._each(tr, td).max(axis=0))
         return np.full(tr.shape, np.nan)
 
     @property
     def limit(self) -> float:
-        """Return the error above which a body is out of place, the least of all bodies whose parts move [length]."""
+        """Return the largest acceptable position error, the smallest of all bodies with moving parts [length]."""
         return min(
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
@@ -394,7 +393,7 @@ class Bodies:
         )
 
     def worst(self, tr: float, td: float) -> Off | None:
-        """Return the body that is displaced most; None outside the flight, or if an error is unknown."""
+        """Return the most displaced body; None outside the flight, or if an error is unknown."""
         if self._complete:
             errors = self._each(np.array([tr]), td)[:, 0]
         else:
@@ -412,7 +411,7 @@ class Bodies:
         )
 
     def _each(self, tr: Samples, td: float) -> Samples:
-        """Return the errors of all bodies, shape (bodies, k) [length]."""
+        """Return the position errors of all bodies, shape (bodies, k) [length]."""
         return np.stack([drift.errors(tr, td) for drift in self._known])
 
 
@@ -422,7 +421,7 @@ def find_bodies_in_flight(
     told: Sequence[RigidBody] | None,
     placement: Placement | None = None,
 ) -> Bodies:
-    """Find how far the bodies that the switched parts become are displaced in a flight.
+    """Find the displacements of the bodies that the switched parts become in a flight.
 
     Parameters
     ----------
@@ -465,7 +464,7 @@ def _find_drift_of_body(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Return the displacement of one body of those parts that have energy; a single part that flies has none."""
+    """Return the displacement of a body of parts with energy; a single flying part has none."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

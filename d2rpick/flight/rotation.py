@@ -1,4 +1,4 @@
-"""Find the steady rotation of a flying body from the displacements of its parts about its centre.
+"""Find the steady rotation of a flying body from the displacements of its parts from its centre.
 
 In a body that turns at a constant rate each part moves on a circle.  Displacements less these circles are the motion of
 the parts against each other, in a frame that turns with the body.  The moving parts are those without which the others
@@ -21,30 +21,30 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A rotation counts if it leaves less than this share of the displacements unexplained; more may be vibration.
+# A rotation is accepted if it leaves less than this share of the displacements unexplained; the rest may be vibration.
 _SHOWN: Final = 0.25
-# Most steps of the Gauss-Newton iteration; a dozen bring a good start to the last digit.
+# Most Gauss-Newton steps; a dozen steps reach full precision from a good start.
 _MOST_STEPS: Final = 25
-# Step of the rate for derivatives and the end of the iteration, as a share of one turn over the record; also the gain
-# of a step that ends the iteration.
+# Finite-difference step of the rate, as a share of one turn over the record.
+# It is also the tolerance of the iteration for the rate and for the gain of a step.
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Directions in which arms move by less than this share of the others, squared, cannot be determined: along the axis.
+# Directions with squared lever arms below this share of the others cannot be determined: they lie along the axis.
 _ALONG_AXIS: Final = 1e-6
-# Numbers of periods that are tried: steps of 1/20 up to two periods, then 10 % more each.
+# Numbers of periods to try: steps of 1/20 up to two periods, then steps of 10 %.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
-# Number of parts tried as the moving one, by each of two criteria: what rotation, and what rest leaves unexplained.
+# Number of parts tried as the moving one, by each of two criteria for the unexplained displacements.
 _TRIED: Final = 2
-# Without a further moving part the others leave at most this share of the rest with it.
+# Largest unexplained displacement without the next moving part, as a share of that with it.
 _MORE_RIGID: Final = 0.5
-# Less than this share of the parts' r^2 counts as nothing: 0.1 % of the displacements.
+# Shares of the parts' r^2 below this are ignored: 0.1 % of the displacements.
 _NOTHING: Final = 1e-6
-# A rotation that moves the others by 10 % of the part's motion changes its displacement by no more.
+# A rotation that moves the other parts by 10 % of the part's motion changes the displacement by at most as much.
 _NOTABLE_WAY: Final = 0.1
-# A body shows no rotation if one part has more than this share of its mass.
+# The rotation of a body is unknown if a single part has more than this share of its mass.
 _MOST_OF_BODY: Final = 0.95
-# Parts below this share of the mass are not tried: they move the others too little.
+# Parts below this share of the mass are not tried, because they hardly move the others.
 _HEAVY: Final = 0.05
 
 
@@ -115,7 +115,7 @@ def _fit_steady_rotation(
 
 
 def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
-    """Return the displacements (n, parts, 3) in the turning frame, without circular motion at a rate and mean.
+    """Return the displacements (n, parts, 3) in the rotating frame, without circular motion at a rate and mean.
 
     The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """
@@ -130,7 +130,7 @@ def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
 
 
 def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
-    """Return the number of periods of the harmonic motion that best explains the rest of a displacement.
+    """Return the number of periods of the harmonic motion that best fits the unexplained displacement.
 
     A motion of less than a period looks like an arc, so the subtracted circle took most of it.  Therefore a circle is
     subtracted from each trial motion before it is compared with ``left`` (n, 3).  Infinite if none explains half of it.
@@ -170,7 +170,7 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
 
 
 def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
-    """Return for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
+    """Return the m r^2 of the other parts about their own centre without rotation, for each part (parts,)."""
     return np.asarray(
         _sum_without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
@@ -179,7 +179,7 @@ def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
 
 
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    """Estimate for each part how much of that sum a rotation of the others leaves unexplained (parts,).
+    """Estimate the part of that sum that a rotation of the other parts leaves unexplained (parts,).
 
     In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
     integrals: linear in the rate, with normal equations from which one part is easily removed.
@@ -197,7 +197,7 @@ def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samp
 
 
 def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
-    """Sum quadratic terms (parts, ...) of displacements over all parts but one, about the centre of these."""
+    """Sum quadratic terms (parts, ...) over all parts but one, about the centre of the summed parts."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
@@ -222,12 +222,12 @@ def _list_linear_terms(
 def _compute_rest(
     time: Samples, ways: Samples, rate: Samples, weights: Samples
 ) -> Samples:
-    """Return the sum of m r^2 that a rotation at ``rate`` leaves unexplained."""
+    """Return the sum of m r^2 that a rotation at ``rate`` does not explain."""
     return np.asarray(weights * subtract_circles(time, ways, rate))
 
 
 def _rotate_frame(time: Samples, rate: Samples) -> Samples:
-    """Return the axes (n, 3, 3) of a frame that turns at ``rate``; a row vector times it lies in that frame."""
+    """Return the axes (n, 3, 3) of a frame that rotates at ``rate``; a row vector times the axes is in that frame."""
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
@@ -242,7 +242,7 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
 def find_moving_parts(
     time: Samples, ways: Samples, mass: Samples
 ) -> tuple[list[int], Samples, float]:
-    """Find the parts that move against the others, the rate of these, and their rest; no parts if unknown."""
+    """Find the parts that move relative to the others, the rotation of the others, and the unexplained sum."""
     moving: list[int] = []
     rate = np.zeros(3)
     misfit = np.inf
@@ -257,7 +257,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """A part left out, how the others turn, what is unexplained of them, and how far the part displaces them."""
+    """A part left out: the rotation of the others, their unexplained sum, and their displacement by the part."""
 
     part: int
     rate: Samples
@@ -268,7 +268,7 @@ class _Apart(NamedTuple):
 def _find_next_moving_part(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
-    """Find the part without which the others are most nearly rigid.
+    """Find the part whose removal makes the others most nearly rigid.
 
     A slide of one part may look like a rotation of all; among parts alike in this, the one with the largest effect
     counts.
@@ -328,12 +328,12 @@ def _leave_part_out(
 
 
 def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
-    """Return displacements about the centre of mass."""
+    """Return displacements from the centre of mass."""
     return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
 
 
 def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
-    """Return True if the others have half of the mass, and not almost all of it in one part."""
+    """Return True if the other parts have half of the mass, and no part has almost all of it."""
     remaining_mass = mass[left[left != part]]
     return bool(
         2 * remaining_mass.sum() >= mass.sum()
@@ -342,7 +342,7 @@ def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
 
 
 def has_clear_rotation(mass: Samples) -> bool:
-    """Return True if the body still shows its rotation without any one of its heavy parts."""
+    """Return True if the rotation of the body is still found without any one of its heavy parts."""
     if mass.size < 3:
         return False
     columns = np.arange(mass.size)

@@ -1,4 +1,4 @@
-"""How a body that is rigid from tr to td turns away from the one that is not.
+"""Compute how a body that is rigid from tr to td rotates away from the deformable body of the reference run.
 
 Both keep their angular momentum L.  In the frame of the body, with the places y of its parts about the centre of mass
 of all that flies, the tensor of inertia I and w = I^-1 L,
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from d2rpick.deck.geometry import Placement
     from d2rpick.histories.history import Momenta, Samples
 
-# Largest deviation of the body's parts from the places that one rotation of the deck gives them, relative to their
-# size. A body bent more, or placed elsewhere than in the deck, has no orientation to 0.1 degrees.
+# Largest deviation of the parts from their positions in the rotated deck, relative to the size of the body.
+# A body that is bent more, or placed elsewhere, has no orientation to 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Most states of the pass; between them places are straight lines, as vibration hardly turns a body.
+# Most states of the integration; positions are linear between them, as vibration hardly rotates a body.
 _STATES: Final = 2000
-# The frame consists of connected parts with this share of the body's mass, or else of all parts that do not move.
+# The body frame uses connected parts with this share of the body's mass, or else all parts that do not move.
 _MOST: Final = 0.5
 # The angular velocity at the end is the mean over this part of the flight, in which vibration hardly counts.
 _LAST: Final = 10
@@ -42,7 +42,7 @@ _ALONG_LINE: Final = 1e-9
 
 
 class Turning(NamedTuple):
-    """Result of one pass over a flight: arrays over ``time`` (n,), in the frame of the body.
+    """Result of one integration over a flight: arrays over ``time`` (n,), in the frame of the body.
 
     ``place`` (n, 3) is the body's displacement against the centre of mass of all flying parts, as far as the parts that
     become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
@@ -73,7 +73,7 @@ class Turning(NamedTuple):
         return float(np.cross(self.rate, front) @ direction)
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """Return the angles psi by which a body that is rigid from ``tr`` (k,) on is turned at td, (k, 3) [rad]."""
+        """Return the rotation errors psi at td of a body that is rigid from ``tr`` (k,) on, (k, 3) [rad]."""
         pushed, kept_turn = (
             _interpolate_at(self.time, turn, np.array([td]))
             - _interpolate_at(self.time, turn, tr)
@@ -99,7 +99,7 @@ class Turning(NamedTuple):
 
 
 class Flying(NamedTuple):
-    """Parts in a flight from ``start`` to ``end`` [time]: ``momenta`` of single parts and their ``masses`` (parts,).
+    """Parts in a flight from ``start`` to ``end`` [time]: part ``momenta`` and ``masses`` (parts,).
 
     A mass is NaN if it is unknown.  ``members`` are the columns of the parts that become one rigid body, ``others``
     those of all parts that fly with them, which the moving parts displace too.
@@ -116,7 +116,7 @@ class Flying(NamedTuple):
 def follow_turning(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Turning | None:
-    """Follow the orientation of the body that parts become, from the places of all flying parts in the deck.
+    """Follow the orientation of the body of given parts, from the deck positions of all flying parts.
 
     ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, the
     record does not begin with the run, or the parts of the body do not determine its orientation.
@@ -189,7 +189,7 @@ def follow_turning(
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # according to the deck
+    )  # positions of the parts according to the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
     nodes = (nodes - home + middle[-1]) @ frames[-1].T
@@ -215,7 +215,7 @@ def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
 def _choose_frame_parts(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Sequence[int]:
-    """Return the parts that make the frame of the body: connected parts that do not move against each other."""
+    """Return the parts that define the body frame: connected parts that do not move relative to each other."""
     parts = seen.momenta.parts or ()
     still = [i for i in seen.members if i not in moving]
     together = placement.hanging_together([parts[i].id for i in still])
@@ -226,7 +226,7 @@ def _choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return the angle by which the frame turns from one time to another if each of its parts in turn is left out.
+    """Return how much the rotation between two times changes if each frame part is left out in turn.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
     line determine no angle and give 0.
@@ -259,8 +259,8 @@ def _solve_turning(
     )
     kept_rate = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # L at rest
-    momentum = kept_rate @ frames  # in the frame of the body
+    )  # angular momentum in the frame at rest
+    momentum = kept_rate @ frames  # angular momentum in the frame of the body
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light
     carried = _integrate_matrix(
@@ -305,7 +305,7 @@ def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 
 def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return how far parts deviate from their shape, over its size across its longest axis; infinite on a line."""
+    """Return the deviation of parts from their shape, relative to its size across its longest axis."""
     least_extent = (
         np.linalg.eigvalsh(_compute_second_moments(shape[np.newaxis], mass)[0])[
             :2
@@ -336,17 +336,17 @@ def _compute_turns(frames: Samples) -> Samples:
 
 
 def _weigh_by_mass(values: Samples, mass: Samples) -> Samples:
-    """Return the mean of values weighted by mass."""
+    """Return the mass-weighted mean of values."""
     return np.asarray(np.einsum("p,...pi->...i", mass, values) / mass.sum())
 
 
 def _compute_second_moments(places: Samples, mass: Samples) -> Samples:
-    """Return the second moments of mass of places."""
+    """Return the second mass moments of positions."""
     return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
 
 
 def _compute_inertia(second: Samples) -> Samples:
-    """Return the tensor of inertia from the second moments (..., 3, 3)."""
+    """Return the inertia tensor from the second moments (..., 3, 3)."""
     return np.asarray(
         np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
         - second
@@ -364,12 +364,12 @@ def _make_cross_matrices(vectors: Samples) -> Samples:
 
 
 def _take_middle_values(values: Samples) -> Samples:
-    """Return the values in the middle of the steps."""
+    """Return the mean of the values at both ends of each step."""
     return np.asarray((values[1:] + values[:-1]) / 2)
 
 
 def _sum_running(steps: Samples) -> Samples:
-    """Return the running sum of steps, from 0."""
+    """Return the running sum over steps, which starts at 0."""
     return np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
 
 

@@ -1,4 +1,4 @@
-"""Find what vibrates together in a flight: parts beside the chosen ones, and the kinetic energy of all of them."""
+"""Find what vibrates together in a flight: further parts next to the chosen ones, and their kinetic energy."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _FEWEST: Final = 16  # fewest states that separate a fall from a vibration
 
 
 class Beside(NamedTuple):
-    """Parts that vibrate with the chosen ones and were not chosen; ``energy`` is the range of their energy [energy]."""
+    """Parts that vibrate with the chosen ones but were not chosen; ``energy`` is the range of their energy [energy]."""
 
     parts: tuple[Part, ...] = ()
     energy: float = 0.0
 
 
 def find_vibrating_parts(history: History, flight: Flight) -> Beside:
-    """Find the parts that vibrate with the chosen ones and were not chosen.
+    """Find the parts that vibrate with the chosen ones but were not chosen.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Find windows around a time in which a record obeys a law of free flight, as long as possible and no longer."""
+"""Find the longest window around a time in which a record obeys a law of free flight."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# First limit of the misfit in free flight, as a share of the range over the record; a contact exceeds it at once.
+# Initial tolerance of free flight, as a share of the range over the record; a contact exceeds it at once.
 TOLERANCE = 1e-3
-# Any smooth motion obeys a law for a moment; its misfit grows with the cube of time or faster. At 1/10 of the tolerance
-# such a moment shrinks by the cube root, a free flight hardly does: the limit of the shrinkage lies between. A smoothly
-# fading load shrinks the window too, until the limit is below what is left of it; so the limit is lowered by tenths,
-# down to the resolution of the numbers, while the window stays.
+# Any smooth motion obeys a law for a moment, and its misfit grows with the cube of time or faster.
+# At 1/10 of the tolerance such a window shrinks to less than half, a free flight hardly shrinks.
+# Therefore the tolerance is divided by 10 while the window stays, down to the resolution of the numbers.
+# A smoothly fading load shrinks the window too, until the tolerance is below the rest of the load.
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # A vibration leaves at least this share of the window's misfit in its middle half (a smooth load leaves 1/8).
 _RINGS = 1 / 3
-# Least length of a window as a share of the record, and fewest states.
+# Shortest window as a share of the record, and fewest states.
 SHORTEST, FEWEST = 0.05, 12
-# The misfit of a window's middle, without this share at each end, is that of free flight itself. The window may have
-# 1.5 times the part due to digits, which is bounded, and 3 times the rest, which is not: its maximum is taken over more
-# states and a longer time.
+# The misfit of the middle of a window, without this share at each end, belongs to the free flight itself.
+# The whole window may have 1.5 times the part due to digits, which is bounded.
+# It may have 3 times the unbounded rest, whose maximum is taken over more states and a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
-# Relative resolution of any quantity: solvers add up in single precision.
+# Relative resolution of any quantity: solvers sum in single precision.
 ROUND_OFF = 1e-7
-# One of this many times is a mark from which a long flight is searched.
+# Every fifth of these times is a mark from which long flights are searched.
 _FAR: Final = 5
-# Most repetitions; each time the window shrinks its middle is clearer of the contacts, and soon it stays.
+# Most repetitions: a shrinking window leaves the contacts behind, so it soon stays.
 _MOST_SHRINKS = 8
 
 
 class FreeFlight(NamedTuple):
-    """A window [time] in which ``parts`` fly freely together; None for parts means the whole model.
+    """A window [time] in which ``parts`` fly freely together; None stands for the whole model.
 
     ``end_seen`` is False if the record ends while it still flies.  ``damping`` is alpha, the decay rate of the momentum
     [1/time].  ``gravity`` is the acceleration taken as gravity: 0 without, NaN if nothing but its constancy shows it,
@@ -59,7 +59,7 @@ class FreeFlight(NamedTuple):
         cls, time: Samples, states: tuple[int, int], parts: tuple[Part, ...] | None = None, *,
         damping: float = 0.0, gravity: float = 0.0,
     ) -> FreeFlight:  # fmt: skip
-        """Make the flight from the first to the last of some states of a record."""
+        """Make the flight from the first to the last of given states of a record."""
         first, last = states
         return cls(
             float(time[first]),
@@ -72,7 +72,7 @@ class FreeFlight(NamedTuple):
 
 
 class Law:
-    """A law of free flight over ``time`` (n,), and how far a record deviates from it.
+    """A law of free flight over ``time`` (n,), and the deviation of a record from it.
 
     The misfit of each window is computed once: neighbouring times ask for the same windows.
     """
@@ -82,14 +82,14 @@ class Law:
         self._misfits: dict[tuple[int, int], float] = {}
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the largest deviation of states ``first`` to ``last``, in any order, from the law's best fit."""
+        """Return the largest deviation of states ``first`` to ``last``, in any order, from the best fit of the law."""
         window = min(first, last), max(first, last)
         if window not in self._misfits:
             self._misfits[window] = self._misfit(*window)
         return self._misfits[window]
 
     def _misfit(self, first: int, last: int) -> float:
-        """Compute the misfit of states in order."""
+        """Compute the misfit of states in ascending order."""
         raise NotImplementedError
 
 
@@ -100,7 +100,7 @@ class Constant(Law):
         super().__init__(time)
         self.values = np.asfortranarray(
             values
-        )  # contiguous columns, since windows are long
+        )  # contiguous columns are faster for long windows
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -116,7 +116,7 @@ def find_lasting_window(
     enough: float = 0.0,
     rings: bool = False,
 ) -> tuple[int, int] | None:
-    """Find the states around ``td`` that obey the law, and still do so under a stricter limit.
+    """Find the states around ``td`` that obey the law, and still obey it under a stricter tolerance.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def _find_converged_window(
     *,
     rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
-    """Find the window around the state ``at`` that hardly shrinks at 1/10 of the limit; None if it does.
+    """Find the window around the state ``at`` that hardly shrinks at 1/10 of the tolerance, or None.
 
     The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
     returned: the misfit that the window may leave, and whether it first began with the record.
@@ -185,7 +185,7 @@ def _find_converged_window(
     while _is_long_enough(time, window):
         strict = _TIGHTER * limit + noise
         finer = find_longest_window(law, at, strict)
-        if enough:  # what fades is steady at one end
+        if enough:  # a fading load is steady at one end of the window
             ends = (find_longest_window(law, end, strict) for end in window)
             finer = max(finer, *ends, key=lambda states: _measure_length(time, states))
         share = _measure_length(time, finer) / _measure_length(time, window)
@@ -215,7 +215,7 @@ def _find_converged_window(
 
 
 def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
-    """Return True if a window's misfit is nearly as large in its middle half; a smooth load leaves 1/8 there."""
+    """Return True if the misfit in the middle half is nearly that of the window; a smooth load leaves 1/8 there."""
     quarter = (window[1] - window[0]) // 4
     return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
         *window
@@ -223,13 +223,13 @@ def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
 
 
 def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
-    """Return True if a window shrinks only where a load fades; a contact or the record ends its other side."""
+    """Return True if a window shrinks only at the end of a fading load; the other end is a contact."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 
 
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
-    """Return the first and last state of the longest window around the state ``at`` with a misfit below ``room``.
+    """Return first and last state of the longest window around the state ``at`` with a misfit below ``room``.
 
     Near an end of the flight a short window may reach across it.  The side grown first decides, so both orders are
     tried.
@@ -248,12 +248,12 @@ def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
 
 
 def list_moments(time: Samples) -> Iterator[float]:
-    """Yield times so close together that each flight of sufficient length contains one."""
+    """Yield times so close together that each flight of sufficient length contains one of them."""
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
 
 
 def list_marks(time: Samples, td: float) -> Iterator[float]:
-    """Yield the times at which the search for the flight around ``td`` starts; many td share them.
+    """Yield the start times of the search for the flight around ``td``; many td share them.
 
     First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
     """
@@ -270,7 +270,7 @@ def find_all_windows(
     for moment in list_moments(time):
         if not flights or moment > flights[-1].end:
             flight = around(moment)
-            if flight:  # the tolerance may let it begin some states before the last flight has ended
+            if flight:  # within the tolerance it may begin some states before the last flight has ended
                 flights.append(
                     flight._replace(start=max(flight.start, flights[-1].end))
                     if flights
@@ -282,7 +282,7 @@ def find_all_windows(
 def _tighten_window(
     law: Law, window: tuple[int, int], noise: float, loose: float
 ) -> tuple[int, int]:
-    """Shrink a window until its ends deviate no more than its middle, which cuts off the rest of a load.
+    """Shrink a window until its ends deviate no more than its middle, to cut off the rest of a load.
 
     The tolerance hides the last, weak pushes of a load.  The middle of the flight shows how exactly the run obeys the
     law, limited by digits, round-off or the solver's errors.  If that limit is stricter than ``loose``, by which the
@@ -309,7 +309,7 @@ def _tighten_window(
 def _cut_off_hidden_push(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
-    """Cut off what ``room`` still hides of a push at the ends of a window.
+    """Cut off the rest of a push at the ends of a window that is hidden by the tolerance ``room``.
 
     The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
     room takes as long as from there to its end.  Less than one state cannot be resolved.
@@ -340,7 +340,7 @@ def _measure_length(time: Samples, window: tuple[int, int]) -> float:
 
 
 def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
-    """Walk from ``start`` towards ``limit`` in doubling steps while it fits, then halve the last step."""
+    """Walk from ``start`` towards ``limit`` in doubling steps while they fit, then bisect the last step."""
     sign = 1 if limit > start else -1
     good = start
     step = 1
@@ -364,7 +364,7 @@ def limit_to_unheld(
     parts: Sequence[Part] | None,
     td: float,
 ) -> FreeFlight | None:
-    """Return the part of a flight around ``td`` [time] between the times at which parts, or the model, are held."""
+    """Return the part of a flight around ``td`` [time] in which the parts, or the model, are not held."""
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None

@@ -1,4 +1,4 @@
-"""Find free flight in the energies of the model: gravity and damping proportional to mass do all the work.
+"""Find free flight in the energies of the model: only gravity and mass-proportional damping do work.
 
 With the resultant F of gravity, the momentum p and the mass m, gravity does the work int F p/m dt; such damping does -2
 alpha int K dt, which Radioss counts as external work.  While nothing touches, the contact energy is constant.
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
 
 # Fewest states that separate a load from gravity and damping: twice the number of unknowns.
 FEWEST_STATES: Final = 6
-# Error of the work of gravity due to sampling and the solver's sums, as a share of its change; contacts change more.
+# Relative error of the work of gravity from sampling and the sums of the solver; contacts change more.
 _OWN_ERROR: Final = 1e-3
-# If no velocity is written, damping bends the parabola of the work of gravity by this share.
+# If no velocity is written, damping changes the parabola of the work of gravity by this share.
 _BENT: Final = 1e-2
-# The mass follows from kinetic energy and velocity; states slower than this share (squared) are left out.
+# The mass follows from kinetic energy and velocity; states with less than this squared share of speed are left out.
 _SLOW: Final = 1e-2
-# Factor on that mass, which is a bound already: a table may contain the kinetic energy of the chosen parts only, and a
-# load that works like gravity without moving the model exceeds it by orders of magnitude.
+# Factor on that mass, an upper bound: a table may contain the kinetic energy of the chosen parts only.
+# A load that works like gravity without moving the model exceeds it by orders of magnitude.
 _MASS_ERROR: Final = 2.0
-# A deviation below the tolerance of this share of the internal energy's range shows no work.
+# A deviation below the tolerance of this share of the range of the internal energy shows no work.
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies less the work of gravity, in relative errors of a printed number: energies, momenta and the
-# mass found from both are rounded, the mass at the state where this matters most.
+# Error of a sum of energies minus the work of gravity, in relative errors of a printed number.
+# Energies, momenta and the mass found from both are rounded; the state with the largest effect decides.
 _OF_DIGITS: Final = 4
-# Loss of kinetic energy that counts as none, and loss that separates damping from friction; the momentum changes by
-# half the share of the kinetic energy.
+# Losses of kinetic energy below the first share are ignored; those above the second are friction, not damping.
+# The relative change of the momentum is half of that.
 _LITTLE, _MUCH = 5e-3, 0.5
 
-# A contact energy within this many times its printed digits shows no contact at all.
+# A contact energy within this many times its printed digits shows no contact.
 _VISIBLE = 100
 
 
@@ -85,7 +85,7 @@ def compute_work_beyond_gravity(
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Return the largest factor of the integral of F v: the whole motion has at most all the kinetic energy."""
+    """Return the largest factor of the integral of F v: the motion has at most the whole kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     if fast.any():
@@ -117,7 +117,7 @@ def _fit_one_sided(
 def _fit_not_negative(
     values: Samples, free: Sequence[Samples], used: Sequence[Samples]
 ) -> tuple[Samples, Samples]:
-    """Return the residual of a fit to ``values``, and the factors of the columns ``used``, none of them negative."""
+    """Return the residual of a fit to ``values``, and the non-negative factors of the columns ``used``."""
     used_columns = list(range(len(used)))
     while True:
         table = np.stack([*free, *(used[i] for i in used_columns)], axis=1)
@@ -130,14 +130,14 @@ def _fit_not_negative(
 
 
 def has_laws(balance: Balance) -> bool:
-    """Return True if work or energy is written that obeys a law in free flight."""
+    """Return True if the record has work or an energy that obeys a law in free flight."""
     return balance.time.size >= FEWEST and bool(_list_terms(balance))
 
 
 def compute_change_of_balance(
     balance: Balance, start: float, end: float
 ) -> float | None:
-    """Return the largest change of kinetic plus internal energy that gravity and damping leave open [energy].
+    """Return the largest change of kinetic plus internal energy that gravity and damping do not explain.
 
     Errors of digits are subtracted.  None if one of the energies is not written.
     """
@@ -167,7 +167,7 @@ def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
 
 
 def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which energy changes only by gravity and damping, or None.
+    """Find the window around ``td`` [time] in which only gravity and damping change the energy; else None.
 
     The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
     all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy
@@ -185,7 +185,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     extent = min(float(np.ptp(term)) for term in terms)
     if (
         balance.internal is not None
-    ):  # a crash into a fixed wall leaves the sum as it was
+    ):  # a crash into a fixed wall does not change the sum
         extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
@@ -210,7 +210,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
 def list_damped_energies(
     balance: Balance, flight: FreeFlight, momenta: Momenta | None
 ) -> tuple[list[Samples], float]:
-    """Return energies (n,) of a balance that damping lowers in a flight, and the error of their digits [energy].
+    """Return energies (n,) that only damping lowers in a flight, and the error of their digits [energy].
 
     The first is kinetic plus internal energy; the list is empty if a load of unknown size works on the model as well.
 
@@ -268,7 +268,7 @@ def is_taken_by_damping(
     vibration: Callable[[Samples], Samples],
     alpha: float | None,
 ) -> bool | None:
-    r"""Return True if kinetic plus internal energy changes between two times [time] as a damped vibration does.
+    r"""Return True if kinetic plus internal energy changes between two times [time] as in a damped vibration.
 
     Damping within the body takes energy only from the vibration, whose energy V(t) is ``vibration``: :math:`K + E - V`
     is constant.  Damping proportional to mass also takes it from the motion of the body, at the rate ``alpha`` of its
@@ -296,7 +296,7 @@ def is_taken_by_damping(
 
 
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
-    """Return the value for gravity in a window: 0 if energies change by nothing or damping alone, else unknown.
+    """Return gravity in a window: 0 if energies are constant or only damped, else unknown.
 
     NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
     shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
@@ -333,7 +333,7 @@ def _classify_gravity(balance: Balance, first: int, last: int) -> float:
 
 
 def _list_terms(balance: Balance) -> list[Samples]:
-    """Return the written energies that change by gravity and damping only, if they change at all."""
+    """Return the written energies that only gravity and damping change, if they change at all."""
     whole = balance.kinetic_and_internal
     internal = balance.internal
     changes = (
@@ -390,7 +390,7 @@ class _Parabola(Law):
 
 
 def has_visible_contacts(balance: Balance) -> bool:
-    """Return True if the contact energy shows that contacts of the model were ever closed."""
+    """Return True if the contact energy shows that contacts of the model were closed at some time."""
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
         return False

@@ -1,1 +1,1 @@
-"""Files of a run -> History: where its bytes come from, what they hold, which energy is meant."""
+"""Read the files of a run into a History: their bytes, their contents, and the selected energy."""

@@ -1,4 +1,4 @@
-"""The energy balance of a run, from terms that each solver names differently."""
+"""Read the energy balance of a run, whose terms have different names in each solver."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzveloc
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
-# Normalised names of the energy of springs: Radioss; glstat of LS-DYNA and its branch of a binout.  In tables the names
-# may mean anything.
+# Normalised names of the spring energy: in Radioss, and in LS-DYNA's glstat and the glstat branch of a binout.
+# In tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Below this share of the peak internal energy, springs have no energy: single precision and glstat have six digits.
+# Springs below this share of the peak internal energy have no energy: single precision and glstat have six digits.
 _NONE: Final = 1e-6
-# Least energy of springs [energy]: LS-DYNA prints 1e-20 for zero.
+# Smallest spring energy [energy]: LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
 # Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
 _ADDS_UP: Final = 1e-3
-# Threshold between the factors 0 and 1 of parts in a sum.
+# Threshold between the factors 0 and 1 of a part in a sum.
 _HALF: Final = 0.5
 
 
@@ -87,7 +87,7 @@ def read_balance(
 
 
 def read_terms(databases: Sequence[Legs]) -> Balance | None:
-    """Return the energy balance of the whole model, even if it is not enough to judge the health of the run.
+    """Return the energy balance of the whole model, even if it is too incomplete to judge the run.
 
     The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
@@ -98,7 +98,7 @@ def read_terms(databases: Sequence[Legs]) -> Balance | None:
 
 
 def read_momentum(database: Legs) -> Momenta | None:
-    """Return the momentum of the whole model, or its velocity, of an unknown mass; None if neither is written."""
+    """Return the momentum of the model, or its velocity with unknown mass; None if neither is written."""
     has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
     if not has_components and not _find_global_velocities(database):
         return None
@@ -108,7 +108,7 @@ def read_momentum(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = float("nan")  # unknown, or nothing moves
+    mass = float("nan")  # unknown mass, or no motion
     if columns.momentum:
         mass = columns.mass(values) or mass
     return Momenta(
@@ -123,7 +123,7 @@ def read_momentum(database: Legs) -> Momenta | None:
 
 
 def compute_least_masses(momenta: Samples, kinetic: Samples) -> Samples:
-    """Return the least masses (k,) with these momenta (n, k, 3) and kinetic energies (n, k); 0 without energy."""
+    """Return the smallest masses (k,) with these momenta (n, k, 3) and kinetic energies (n, k)."""
     squares = np.sum(momenta**2, axis=2)
     masses = np.divide(
         squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0
@@ -171,7 +171,7 @@ def _find_global_velocities(database: Legs) -> dict[str, str]:
 
 
 class _Columns:
-    """The columns of a database by their meaning, in its first ``states`` states.
+    """The columns of a database by their meaning, for its first ``states`` states.
 
     A column that is missing, or not in every state, is None.
     """
@@ -183,7 +183,7 @@ class _Columns:
         self.momentum = False  # True once a momentum was read as the velocity
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model: as written, or the least mass with these momenta, (n, 1, 3)."""
+        """Return the mass of the model, as written or the smallest with these momenta, (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -193,7 +193,7 @@ class _Columns:
         return float(compute_least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def quantity(self, quantity: str) -> Samples | None:
-        """Return the column of a quantity of `d2rpick.histories.names.QUANTITIES`."""
+        """Return the column of a quantity in `d2rpick.histories.names.QUANTITIES`."""
         name = self._database.quantities.get(quantity)
         return None if name is None else self._values(name)
 
@@ -225,7 +225,7 @@ class _Columns:
         return stacked
 
     def internal(self) -> Samples | None:
-        """Return the internal energy of the whole model, preferably a total: a plain one may be that of some parts."""
+        """Return the internal energy of the model, preferably a total, as a plain one may belong to some parts."""
         for says_so in (is_total_internal_energy, is_internal_energy):
             names = [name for name in self._database.channels if says_so(name)]
             if names:
@@ -242,7 +242,7 @@ class _Columns:
 
 
 def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
-    """Stack components (n,) to vectors (n, 3) with 0 for a missing one; return None if fewer than two are there."""
+    """Stack components (n,) into vectors (n, 3) with 0 for a missing one; None if fewer than two exist."""
     present = [component for component in components if component is not None]
     if len(present) < 2:
         return None
@@ -275,7 +275,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return name and values (n,) of the energy of all springs and dampers; None if it is zero, or all energy."""
+    """Return name and values (n,) of the energy of springs and dampers; None if it is zero, or the whole energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
@@ -303,7 +303,7 @@ def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
 def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies add up to the energy of all springs and dampers; () if no set of parts does.
+    """Return the parts whose energies add up to the energy of springs and dampers; () if there is no such set.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """

@@ -1,4 +1,4 @@
-"""Forces of contacts and rigid walls in the files of a run, and the states between which they act.
+"""Read the forces of contacts and rigid walls, and the states between which they act.
 
 A solver writes exactly zero if nothing touches. LS-DYNA writes forces at each state; Radioss writes their impulses
 since the start, which do not change while no force acts, and miss no force.
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# A force, or a change of an impulse, below this share of the largest is zero: single precision has seven digits.
+# A force or impulse change below this share of the largest is zero: single precision has seven digits.
 _NOTHING: Final = 1e-6
 
 
 class ContactForce(NamedTuple):
-    """The force of a contact or rigid wall of this ``name`` over ``time`` (n,) [time].
+    """The force of the contact or rigid wall ``name`` over ``time`` (n,) [time].
 
     ``impulses`` of shape (n, 3) are those since the state before, 0 for the first state; NaN if unknown [momentum].
     ``acts`` (n,) is True if a force acts between a state and the one before.
@@ -67,7 +67,7 @@ class ContactForce(NamedTuple):
 
     @property
     def times(self) -> tuple[tuple[float, float], ...]:
-        """Intervals (start, end) in which the force acts: from the last state without a force to the next one."""
+        """Intervals (start, end) in which the force acts: from the last state without force to the next one."""
         return tuple(
             (
                 float(self.time[max(interval.start - 1, 0)]),
@@ -78,14 +78,14 @@ class ContactForce(NamedTuple):
 
     @property
     def tells(self) -> bool:
-        """True if the force acts at some times and not at others."""
+        """True if the force acts at some times only."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
 def find_force(
     forces: Sequence[ContactForce], kind: str, number: int
 ) -> ContactForce | None:
-    """Give the force of the contact, interface or rigid wall (``kind``) of this number; None if it is not written."""
+    """Return the force of a contact, interface or rigid wall (``kind``) by its number; None if it is not written."""
     head = f"{kind} {number}"
     return next(
         (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None
@@ -95,7 +95,7 @@ def find_force(
 def join_contact_forces(
     pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
 ) -> ContactForce:
-    """Join the forces of one contact in the legs of a run; ``keep`` are the valid states of all legs together.
+    """Join the forces of one contact in the legs of a run; ``keep`` marks the valid states of all legs together.
 
     Between two legs the force acts if it acts just before or after.
     """
@@ -114,6 +114,6 @@ def join_contact_forces(
 
 
 def _is_above_round_off(values: Samples) -> NDArray[np.bool_]:
-    """Return True for each state whose values (n, k) are more than round-off compared with the largest of all."""
+    """Return an array that is True for states whose values (n, k) exceed round-off of the largest value."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

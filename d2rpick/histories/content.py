@@ -1,4 +1,4 @@
-"""The bytes of one file as they were when it was opened, even if the file changes later.
+"""Provide the bytes of a file as they were when it was opened, even if the file changes later.
 
 A running solver appends to its files, and a restarted one cuts them and writes them anew. Bytes after the size at
 opening are ignored. If a file is cut or rewritten while it is read, its size and times show it, which is an error.
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # bytes; a file up to this size is held in memory
+_HELD: Final = 1 << 24  # bytes; a file of up to this size is kept in memory
 _LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
-# Bytes at both ends of the content by which a file is recognised after it has grown.
+# Bytes at both ends of a file by which it is recognised after it has grown.
 _END: Final = 1 << 12
 
 
 class Content:
-    """The bytes of a file, held in memory."""
+    """The bytes of a file in memory."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -53,19 +53,19 @@ class Content:
         return self._data[where]
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Return the address of the first ``wanted`` from ``begin`` on, -1 if there is none."""
+        """Return the offset of the first ``wanted`` at or after ``begin``, or -1."""
         return self._data.find(wanted, begin)
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Return the address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 if there is none."""
+        """Return the offset of the last ``wanted`` between ``begin`` and ``end``, or -1."""
         return self._data.rfind(wanted, begin, end)
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Return the bytes from one address to another, shape (end - begin,)."""
+        """Return the bytes between two offsets, shape (end - begin,)."""
         return np.frombuffer(self._data, np.uint8)[begin:end]
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Return ``width`` bytes at each of many addresses, shape (n, width)."""
+        """Return ``width`` bytes at each of many offsets, shape (n, width)."""
         return _gather_fields(self.view(0, len(self)), addresses, width)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
@@ -85,12 +85,12 @@ class Content:
 
 
 def make_content(data: bytes | Content) -> Content:
-    """Return the content of bytes, whether they are in memory or on disk."""
+    """Return the content of bytes, which may be in memory or on disk."""
     return Content(data) if isinstance(data, bytes) else data
 
 
 class OnDisk(Content):
-    """The bytes of a file that are read from disk at each request.
+    """The bytes of a file, read from disk at each request.
 
     Parameters
     ----------
@@ -103,10 +103,10 @@ class OnDisk(Content):
     """
 
     # Sizes of the chunks that are read at once [bytes].
-    block = 1 << 19  # of many bytes; a power of 2, which stays in the cache
-    # between two fields read together: a system call costs more than these
+    block = 1 << 19  # for many bytes; a power of 2 that fits into the cache
+    # gap between two fields that are read together: a system call costs more
     gap = 1 << 13
-    # of few bytes: further requests are mostly for the bytes after them
+    # for few bytes: further requests are mostly for the bytes that follow
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
@@ -115,7 +115,7 @@ class OnDisk(Content):
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
         self._lock = Lock()
-        self._own = local()  # of each thread: its buffer and its window
+        self._own = local()  # each thread has its own buffer and window
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 
@@ -143,14 +143,14 @@ class OnDisk(Content):
         if begin < end and (begin < first or end > first + len(window)):
             if end - begin > self.window:
                 return self.view(begin, end).tobytes()
-            # a search backwards will need the bytes before
+            # a backward search needs the bytes before the window
             first = begin if begin >= first else max(0, end - self.window)
             window = self.view(first, min(first + self.window, self._size)).tobytes()
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Return the address of the first ``wanted`` from ``begin`` on, -1 if there is none."""
+        """Return the offset of the first ``wanted`` at or after ``begin``, or -1."""
         for start in range(begin, self._size, self.gap):
             piece = self[start : start + self.gap + len(wanted) - 1]
             index = piece.find(wanted)
@@ -159,7 +159,7 @@ class OnDisk(Content):
         return -1
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Return the address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 if there is none."""
+        """Return the offset of the last ``wanted`` between ``begin`` and ``end``, or -1."""
         for stop in range(end, begin, -self.gap):
             first = max(begin, stop - self.gap)
             index = self[first:stop].rfind(wanted)
@@ -168,13 +168,13 @@ class OnDisk(Content):
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Return the bytes between two addresses, shape (end - begin,), valid until the next call in this thread."""
+        """Return the bytes between two offsets, shape (end - begin,), valid until the next call in this thread."""
         data = self._room(end - begin)
         self._fill(data.data, begin)
         return data
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Return ``width`` bytes at each of many addresses, shape (n, width); valid only after a `check`."""
+        """Return ``width`` bytes at each of many offsets, shape (n, width); valid only after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):
             order = np.argsort(addresses, kind="stable")
             fields = np.empty((addresses.size, width), np.uint8)
@@ -183,7 +183,7 @@ class OnDisk(Content):
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Return an array for ``size`` bytes; few bytes share a buffer, since new memory costs more than reading."""
+        """Return an array of ``size`` bytes; small arrays share a buffer, since new memory costs more than reading."""
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -192,7 +192,7 @@ class OnDisk(Content):
         return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
-        """Read fields at ascending addresses; fields that are close together are read in one piece."""
+        """Read fields at ascending offsets; fields that are close together are read at once."""
         fields = np.empty((addresses.size, width), np.uint8)
         if not addresses.size:
             return fields
@@ -215,7 +215,7 @@ class OnDisk(Content):
         return fields
 
     def sha256(self) -> str:
-        """Return the SHA-256 of the bytes; raise ChangedError if they are not those that were read before."""
+        """Return the SHA-256 of the bytes; raise ChangedError if they differ from those read before."""
         if not self._digest:
             import hashlib
 
@@ -237,7 +237,7 @@ class OnDisk(Content):
         """Fill ``room`` with the bytes of an open file from ``begin`` on."""
         file.seek(begin)
         done = file.readinto(room)
-        while done < len(room):  # a single call reads 2 GB at most
+        while done < len(room):  # a single call reads at most 2 GB
             count = file.readinto(room[done:])
             if not count:
                 raise self._shortened()
@@ -251,17 +251,17 @@ class OnDisk(Content):
         )
 
     def check(self) -> None:
-        """Raise ChangedError unless all that was read so far belongs to one state of the file."""
+        """Raise ChangedError unless everything read so far belongs to one state of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # a write sets its time first and its size last: it may be in progress
+            # a write changes the time first and the size last, so it may be in progress
             wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        # true if the file has grown, or has another name
+        # True if the file has grown, or was renamed
         untouched = now.size > self._size or now.modified == self._state.modified
         if not untouched or self._read_ends() != self._ends:
             problem = f"{self._name}: the file was rewritten while it was read"
@@ -281,7 +281,7 @@ class OnDisk(Content):
 
 
 class Scattered(OnDisk):
-    """The bytes of a file of which little is read, at scattered addresses.
+    """The bytes of a file that is read at few, scattered offsets.
 
     The file is opened for each reading: a run may have written more such files than a process may have open.
     """
@@ -294,7 +294,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]
-        """Window of each thread; made at the first use, since of most files only the states are read."""
+        """Window of each thread, created at the first use: only the states of most files are read."""
         from threading import local
 
         return local()
@@ -323,7 +323,7 @@ class Scattered(OnDisk):
             self._fill_from(file, room, begin)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows as `Content.fill_rows`; the file is opened once."""
+        """Fill the rows as `Content.fill_rows` does; the file is opened once."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
             for row, address in zip(room, range(begin, end, stride), strict=True):
@@ -333,7 +333,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files of which little is read, once they are not being written.
+    """Return the contents of files that are read at few offsets, once they are not being written.
 
     Raises
     ------
@@ -383,14 +383,14 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
 
 
 def count_line_number(data: Content, address: int) -> int:
-    """Return the number of the line at an address, counted from 1."""
+    """Return the number of the line at an offset, counted from 1."""
     pieces = (data[at : min(at + _LINES, address)] for at in range(0, address, _LINES))
     return 1 + sum(piece.count(b"\n") for piece in pieces)
 
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
-    """Return ``width`` bytes at each address, shape (n, width)."""
-    # a view with a field at every address, so that fetching is plain indexing
+    """Return ``width`` bytes at each offset, shape (n, width)."""
+    # a view with a field at every offset, so that fetching is plain indexing
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

@@ -1,4 +1,4 @@
-"""A file of a run as a database of columns, which are read at the first request; several legs as one database.
+"""Represent a file of a run as a database of columns that are read on request, and several legs as one database.
 
 Databases of different formats that one run wrote are companions; they are checked here for being of one run.
 """
@@ -31,27 +31,27 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# A restart steps back once; times that step back at more than this share of the states are not times.
+# A restart steps back once; if more than this share of the states steps back, the column is not a time.
 _MOST_BACK: Final = 0.1
-# Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
+# Significant digits by bytes per number: 24 bits give 7 digits; 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# Output stops if an interval is this many times the median interval.
+# Output has a gap if an interval is this many times the median interval.
 _LONG = 30.0
-# Number of states whose time steps are compared together; they stay in the cache and need no new memory.
+# Number of states whose time steps are compared at once, so that they fit into the cache.
 _PIECE: Final = 1 << 15
-# Two databases may be of one run if at least this share of the states of the coarser are at times of the other one
+# Databases may belong to one run if this share of the states of the coarser one is at times of the other one.
 # Output intervals may differ, but a solver writes at its own cycles.
 _FEWEST = 0.5
-# The databases of a run end within this many of their longest output interval: a killed run has not written all states.
+# Databases of a run end within this many of their longest output intervals, as a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy, plus
-# round-off relative to the kinetic energy.  In files of solvers their sum exceeds it by less than 0.1 % of the largest.
+# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy.
+# The second value is round-off relative to the kinetic energy. In solver files the excess is below 0.1 %.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one leg of a run, in the units of the run; each reader defines what its files have.
+    """The states of one leg of a run, in the units of the run; each reader defines the contents.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -103,7 +103,7 @@ class Database:
         return ()
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return for each file where a later read can begin; empty if the format is always read as a whole."""
+        """Return where a later read of each file can begin; empty if the format is always read completely."""
         return {}
 
     def branch(self, name: str) -> Database:
@@ -138,7 +138,7 @@ class Database:
         return None
 
     def find(self, wanted: str) -> str:
-        """Return the column that the user means by name or, in tables, by number; FormatError lists the columns."""
+        """Return the column that the user selects by name or, in tables, by number; FormatError lists the columns."""
         return resolve_name(wanted, self.channels, self.source)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
@@ -147,7 +147,7 @@ class Database:
 
 
 class Legs:
-    """The legs of one run as one `Database`: in the order of their start; where they overlap the newer leg is used.
+    """The legs of one run as one `Database`, by their start; in overlaps the newer leg is used.
 
     A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
     are used only if all legs have none.
@@ -160,15 +160,15 @@ class Legs:
         named: Sequence[tuple[str, str]] = (),
         notes: Sequence[str] = (),
     ) -> None:
-        self._cut = cut  # files whose packed data ends early
-        self._own_notes = notes  # on other files
+        self._cut = cut  # files with truncated packed data
+        self._own_notes = notes  # notes on files that are not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # the times of a single leg may not be known yet
+        if len(legs) > 1:  # the times of a single leg may be unknown yet
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
-        # ids and energies of the parts that were requested last
+        # ids and energies of the parts of the last request
         self._energies: tuple[tuple[int, ...], Samples] | None = None
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
@@ -178,7 +178,7 @@ class Legs:
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return for each file of all legs where a later read can begin; empty if they are read as a whole."""
+        """Return where a later read of the files of all legs can begin; empty if they are read completely."""
         points: dict[str, ResumePoint] = {}
         for leg in self._files:
             points |= leg.find_resume_points()
@@ -236,7 +236,7 @@ class Legs:
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(
-                f"{self.source}: only some legs have part {list_names(self._passing)}, which was left out"
+                f"{self.source}: only some restart segments have part {list_names(self._passing)}, which was left out"
             )
         notes += notes_on_states
         if self.parts:
@@ -260,7 +260,7 @@ class Legs:
         return self._joined([leg.part_time for leg in self._legs], self._parts_kept[0])
 
     def find(self, wanted: str) -> str:
-        """Return the column that the user means."""
+        """Return the column that the user selects."""
         return self._legs[0].find(wanted)
 
     def channel(self, name: str) -> Samples:
@@ -268,7 +268,7 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of some parts; energies are stored read-only, since requests repeat."""
+        """Return a quantity of the given parts; energies are kept read-only, since requests repeat."""
         if (
             quantity == "internal_energy"
             and self._energies
@@ -306,18 +306,18 @@ class Legs:
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:
-        """Ids of the parts that only some legs have."""
+        """Ids of the parts that are missing in some legs."""
         legs = Counter(part.id for leg in self._legs for part in leg.parts)
         return tuple(id_ for id_, count in legs.items() if count < len(self._legs))
 
     @cached_property
     def _kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        """Valid states of the whole model, and notes on the others."""
+        """Valid states of the whole model, and notes on invalid states."""
         return self._order([leg.time for leg in self._legs])
 
     @cached_property
     def _parts_kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        """Valid states of the parts, and notes on the others."""
+        """Valid states of the parts, and notes on invalid states."""
         return self._order([leg.part_time for leg in self._legs])
 
     def _order(
@@ -336,7 +336,7 @@ class Legs:
         keep, notes = find_newest_states(all_times)
         ends = np.cumsum([time.size for time in times])
         unused = [
-            f"{leg.source} was not used: a newer leg begins at or before its first time"
+            f"{leg.source} was not used: a newer restart segment begins at or before its first time"
             for leg, states in zip(self._legs, np.split(keep, ends[:-1]), strict=True)
             if states.size and not states.any()
         ]
@@ -350,7 +350,7 @@ class Legs:
 
 
 def _join_columns(columns: Sequence[Samples]) -> Samples:
-    """Join columns; a single one is not copied."""
+    """Join columns; a single column is not copied."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
@@ -370,7 +370,7 @@ def _find_start(leg: Database) -> float:
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a leg: its start, then its name, so that the order of the arguments does not matter."""
+    """Return the sort key of a leg: its start, then its name, regardless of the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
@@ -381,7 +381,7 @@ def _count_digits(precision: Precision) -> int:
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, at which a leg may be missing."""
+    """Return notes on long intervals without output, in which a leg may be missing."""
     if time.size < 4:
         return ()
     pieces = (
@@ -391,12 +391,12 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    if max(longest) <= _LONG * min(shortest):  # the usual case
+    if max(longest) <= _LONG * min(shortest):  # the usual case: regular output
         return ()
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(
-        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?"
+        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a restart segment missing?"
         for i in holes[:3]
     )
 
@@ -435,7 +435,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases with few states at the same printed times, or with different ends."""
+    """Yield a note on each pair of databases with few common printed times, or with different ends."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue
@@ -462,7 +462,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of one of the others, and of the nearest other times.
+    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Times as a user reads and types them: with six digits, perhaps in another unit."""
+"""Round and convert times as a user reads and types them: with six digits, perhaps in another unit."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 _DIGITS: Final = 6  # significant digits of a printed time
-# Significant digits of a sum of times: more than files have, fewer than those of a double.
+# Significant digits of a sum of times: more than in files, fewer than in a double.
 _EXACT: Final = 12
 
-# Units of time by the names that files and users give them [s].  Texts, because a double of 0.001 is not exact.
+# Units of time by their names in files and options [s], as texts, because 0.001 is not exact as a double.
 _SIZES: Final = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), "1"),
     **dict.fromkeys(("ms", "msec"), "1e-3"),
@@ -31,12 +31,12 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# Shares of a record in which a time is rarely meant.  A number in the first 1 % is assumed to be in another unit.
+# Users rarely mean a time in this first share of a record, so it is assumed to have another unit.
 _NEVER_MEANT: Final = 0.01
-# If a smaller unit would lead to the first 5 %, the record was more likely cut before the time.
+# If a smaller unit gives a time in this first share, the record was more likely cut before the time.
 _HARDLY_MEANT: Final = 0.05
-# A td with fewer states before it is rarely meant: they show no period, and hardly any time is saved.  That a thousand
-# times its value is in the record too takes at least a thousand states, or a td before the second one.
+# Users rarely mean a td with fewer states before it, which shows no period and hardly saves time.
+# A value that is in the record in both units needs at least a thousand states, or lies before the second state.
 _FIRST_STATES: Final = 10
 
 
@@ -52,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the time itself, or its printed form if that is earlier.
+    """Return the time, or its printed form if that is earlier.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def round_to_first_as_read(time: float) -> float:
 
 
 def sum_times_as_read(time: float, further: float) -> float:
-    """Add two printed times, without the digits that only a sum of doubles has.
+    """Add two printed times, without the extra digits of a sum of doubles.
 
     Examples
     --------
@@ -74,7 +74,7 @@ def sum_times_as_read(time: float, further: float) -> float:
 
 
 def round_up_as_read(time: float) -> float:
-    """Return the first time with six digits that is not before this one.
+    """Return the first six-digit time at or after this time.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def round_up_as_read(time: float) -> float:
 
 
 def round_down_as_read(time: float) -> float:
-    """Return the last time with six digits that is not after this one.
+    """Return the last six-digit time at or before this time.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def round_down_as_read(time: float) -> float:
 
 
 def format_window(start: float, end: float) -> str:
-    """Format a window so that every printed time between both ends is inside; an interval too short for that in full.
+    """Format a window so that every printed time between its ends is inside; very short windows with all digits.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def format_window(start: float, end: float) -> str:
 
 
 def format_distinctly(numbers: Sequence[float]) -> list[str]:
-    """Format numbers with six digits, or with as many as make different numbers look different.
+    """Format numbers with six digits, or with as many as are needed to distinguish different numbers.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def format_distinctly(numbers: Sequence[float]) -> list[str]:
 
 
 def format_beyond_limit(value: float, limit: float) -> str:
-    """Format a value above or below a limit with three digits, or with as many as show on which side it lies.
+    """Format a value beyond a limit with three digits, or with as many as show on which side it lies.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def format_beyond_limit(value: float, limit: float) -> str:
 
 
 def parse_seconds(text: str) -> Decimal | None:
-    """Return a time given with its unit [s], exact; None if the text is not such a time.
+    """Return a time with a unit exactly [s]; None if the text is not such a time.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def parse_seconds(text: str) -> Decimal | None:
 
 
 def convert_to_unit(text: str, unit: str) -> float | None:
-    """Return a time given with its unit as a number in another ``unit``; None if the text or the unit is not known.
+    """Return a time with a unit as a number in another ``unit``; None if the text or the unit is unknown.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit, or an empty text.
+    """Ask whether an argument outside a ``record`` (n,) was given in a smaller unit; empty if not.
 
     The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
     than its length is assumed to be in the unit of the record.
@@ -209,7 +209,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s."""
+    """Ask whether an argument at the first states of a ``record`` (n,) in ms or us was given in s; empty if not."""
     values = convert_to_unit_of_record(record, times, unit)
     return _ask_for_unit("s", argument, values) if values else ""
 
@@ -217,7 +217,7 @@ def ask_for_larger_unit(
 def convert_to_unit_of_record(
     record: Samples, times: Sequence[float], unit: str = ""
 ) -> list[float]:
-    """Convert times among the first ten states of a ``record`` (n,) from s to the ms or us of the record.
+    """Convert times among the first ten states of a ``record`` (n,) from s to its ms or us.
 
     Return an empty list if neither 1000 times nor 1,000,000 times their value is a time of the record that a user may
     mean. ``unit`` is the unit of the record if its file names it. The start of the record is the same in any unit.
@@ -239,7 +239,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # us first: if both units fit, the value in ms is too early in the record to be meant
+    # us first: if both units fit, the value in ms would be too early in the record
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -248,11 +248,11 @@ def convert_to_unit_of_record(
 
 
 def _scale_times(times: Sequence[float], size: float) -> list[float]:
-    """Multiply times by the size of a unit, without the digits that only a product of doubles has."""
+    """Multiply times by the size of a unit, without the extra digits of a product of doubles."""
     return [float(f"{time * size:.12g}") for time in times]
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return the question whether an argument was meant in a unit, with the values to give instead."""
+    """Ask whether an argument was meant in a unit, with the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

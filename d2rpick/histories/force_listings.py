@@ -1,4 +1,4 @@
-"""LS-DYNA's ASCII databases rcforc (contacts) and rwforc (rigid walls) with forces only.
+"""Read LS-DYNA's ASCII databases rcforc (contacts) and rwforc (rigid walls), which contain only forces.
 
 A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases
 call the sides SURFA and SURFB. A line of rwforc is the time, the number of a wall, its normal force and the force
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
-# Patterns are compiled at their first use, for start-up.
+# Patterns are compiled at their first use, to start faster.
 _CONTACT_LINE: Final = (
     rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
     + rb" +[xyz] *".join([_NUMBER] * 4)
@@ -37,7 +37,7 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-_HEAD: Final = 1 << 16  # bytes that contain the whole legend
+_HEAD: Final = 1 << 16  # bytes that contain the complete legend
 
 
 class _Rows(NamedTuple):
@@ -54,7 +54,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Return the forces of some files; several files with the same contact are legs of a run.
+    """Return the forces of files; several files with the same contact are legs of a run.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the legs of one contact; where they overlap the newer one is used."""
+    """Join the legs of one contact; in overlaps the newer leg is used."""
     return join_contact_forces(
         pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
@@ -101,7 +101,7 @@ def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Return the line with the largest force at each time: sides of a contact have the same force, or one has none."""
+    """Return the line with the largest force at each time: both sides have the same force, or one has none."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
@@ -115,7 +115,7 @@ def _read_contact_rows(data: bytes) -> _Rows:
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the lines of an rwforc; a wall without components gets its normal force as the first one."""
+    """Read the lines of an rwforc; the normal force replaces missing components as the first one."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]

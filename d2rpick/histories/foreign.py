@@ -1,4 +1,4 @@
-"""Files in the folder of a run that are not an energy history: what each file is, and what to name instead.
+"""Recognise files in a run folder that are not an energy history, and name the file to use instead.
 
 Sources: the magic numbers of the formats; ISO/TS 13499 (ISO-MME); the universal file format of SDRC, dataset 58; the
 ASCII databases, d3hsp and messag of LS-DYNA; listings of Radioss; the status file of Abaqus.
@@ -20,8 +20,8 @@ _FROM_FRAME: Final = (
     "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
-# ASCII databases of LS-DYNA without internal energy of the model or its parts, by their file name and by words that
-# only they contain.
+# LS-DYNA's ASCII databases without internal energy of the model or its parts.
+# They are recognised by their file names, and by words that only they contain.
 _DYNA_DATABASES: Final = (
     ("nodout", rb"n o d a l   p r i n t   o u t"),
     ("elout", rb"e l e m e n t   s t r e s s"),
@@ -66,7 +66,7 @@ _DYNA_DATABASES: Final = (
     ),
 )
 _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# A keyword at the start of a line: of LS-DYNA, or of a starter or engine file of Radioss.
+# A keyword at the start of a line, of LS-DYNA or of a starter or engine file of Radioss.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
@@ -218,7 +218,7 @@ def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> Non
 
 
 def _name_dyna_database(source: str, head: bytes) -> str:
-    """Return the name of an ASCII database of LS-DYNA, by its content or else its file name; empty if unknown."""
+    """Return the name of an ASCII database of LS-DYNA, by content or file name; empty if it is unknown."""
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
@@ -227,7 +227,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
 
 
 def _is_deck(head: bytes) -> bool:
-    """Return True if a deck begins here, perhaps after comments."""
+    """Return True if the content begins with a deck, possibly after comments."""
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
     first = next(
         (line for line in lines if line.strip() and not line.lstrip().startswith(b"$")),

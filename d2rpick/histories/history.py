@@ -1,4 +1,4 @@
-"""The data of one run: its internal energy over time, checked; its momenta; the precision of the printed numbers."""
+"""Represent the data of one run: its checked internal energy over time, its momenta, and its printed precision."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
-# in quotes, since importing numpy.typing slows start-up
+# in quotes, because importing numpy.typing slows the start
 Samples: TypeAlias = "NDArray[np.float64]"
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Above, squares of energies overflow a double; no system of units leads to such energies.
+# Squares of larger energies overflow a double; no system of units has such energies.
 LARGEST_ENERGY: Final = 1e150
 # Parts slower than this share of the fastest one are at rest: single precision leaves them a small speed.
 _STILL: Final = 1e-6
@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of the moving parts among these indices, NaN if one is unknown [mass]."""
+        """Return the mass of the moving parts with these indices [mass]; NaN if one is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -134,7 +134,7 @@ class Momenta:
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
-        """Return the largest range of a momentum component of one of these parts over the record [momentum]."""
+        """Return the largest range over the record of a momentum component of one of these parts [momentum]."""
         lowest, highest = self._bounds
         return float((highest - lowest)[list(members)].max())
 
@@ -211,7 +211,7 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Energy (n,) spent against hourglassing, whether the internal energy contains it or not; None if unknown."""
+        """Hourglass energy (n,), even if it is part of the internal energy; None if unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
@@ -224,7 +224,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """The evidence of when the parts fly, apart from their energy.
+    """Evidence of flights in the files of a run, other than the energy of the parts.
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
@@ -254,7 +254,7 @@ NO_EVIDENCE = Given()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class History:
-    """The internal energy of the parts to switch over time, in the consistent units of the run.
+    """Internal energy over time of the parts to switch, in the consistent units of the run.
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly. Anything else
     raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
@@ -355,14 +355,14 @@ class History:
 
     @property
     def left_beside(self) -> str:
-        """A question on later legs of the run in the same folder that were not named; empty if there are none."""
-        # imported here since pathlib slows start-up
+        """A question about later legs in the same folder that were not named; empty if there are none."""
+        # imported here: pathlib slows the start
         from d2rpick.histories.source import find_later_legs
 
         legs = find_later_legs(self.source)
         if not legs:
             return ""
-        return f"; in the same folder is {', '.join(legs)}, a later leg of the run? Name it too"
+        return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
 
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` are in the record."""
@@ -376,6 +376,7 @@ class History:
         hint = self.left_beside if is_late else ""
         if not hint and argument:
             hint = ask_for_smaller_unit(self.time, times, argument)
+        hint = hint or "; give a time within it"
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))
@@ -388,7 +389,9 @@ class History:
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
-        if times[-1] * 1e3 > self.time[-1]:  # the usual case
+        if (
+            times[-1] * 1e3 > self.time[-1]
+        ):  # the usual case: only times below 1/1000 of the record are checked further
             return
         from d2rpick.histories.digits import ask_for_larger_unit
 
@@ -403,14 +406,14 @@ class History:
             )
 
     def energy_at(self, time: float, argument: str = "") -> float:
-        """Return the energy at ``time``, linear between the states; RangeError names ``argument`` outside of them."""
+        """Return the energy at ``time``, linear between the states; outside, RangeError names ``argument``."""
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        cell = slice(index, index + 2)  # numpy would copy whole read-only arrays
+        cell = slice(index, index + 2)  # numpy would copy complete read-only arrays
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
-        """Return the energies at many times within the record, linear between the states, in the shape of the times."""
+        """Return the energies at given times within the record, linear between the states, in their shape."""
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
@@ -439,7 +442,7 @@ class History:
 
 
 def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Return a record with some of its states only: of all its arrays with one row per time, except masses of parts."""
+    """Return a record with selected states: of all its arrays with one row per time, except part masses."""
     size = record.time.size
     rows = {}
     for record_field in fields(record):
@@ -451,7 +454,7 @@ def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
 
 
 def freeze(values: ArrayLike) -> Samples:
-    """Return values as a read-only array of doubles, copied unless they are such an array, not part of another."""
+    """Return values as a read-only array of doubles, copied unless they already are a complete one."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

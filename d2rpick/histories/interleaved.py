@@ -1,4 +1,4 @@
-"""Tables with a row for each time and part, which are not a history of one energy, are recognised and refused."""
+"""Recognise and refuse tables with a row for each time and part, which are not a history of one energy."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# An energy belongs to several parts if, per row of a time, its variation from row to row is this many times that from
-# time to time: coarsely printed times leave one energy the same variation, noise leaves it one for each row.
+# An energy belongs to several parts if its variation within a time exceeds that between times by this factor.
+# Coarsely printed times give a single energy equal variations; noise gives at most one per row.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 

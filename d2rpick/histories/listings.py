@@ -1,4 +1,4 @@
-"""Listings that solvers print next to the histories: version of the engine, CPU time, smallest time steps of the parts.
+"""Read the listings that solvers print: engine version, CPU time, and smallest time steps of the parts.
 
 Sources: the published source of OpenRadioss (radioss_title.F, rbyonf.F, or_build_info.py), its pull request 4538 and
 its commit 780156a9a; ``CUMULATIVE CPU TIME SUMMARY`` of Radioss' engine listing (NAME_0001.out); the timing
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
 
-# Patterns are compiled at their first use by the functions of `re`, for start-up.
+# Patterns are compiled at their first use by the functions of `re`, to start faster.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
-# Bytes at both ends of an engine listing: the engine prints its input first, and the date of the run at the end.
+# Bytes at both ends of an engine listing: the input is at the start, the date of the run at the end.
 _HEAD, _TAIL = 1 << 20, 1 << 16
 _SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
 _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
@@ -77,7 +77,7 @@ _D3HSP: Final = "d3hsp"
 
 
 def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
-    """Yield the listings of restarts whose engine reports a wrong internal energy, and what shows it.
+    """Yield the listings of restarts whose engine reports a wrong internal energy, with the evidence.
 
     OpenRadioss before its fix of January 2026 reports a wrong energy of elements that /RBODY/ON or /RBODY/OFF of a
     restart switches. Nothing is yielded if the listing does not show when the engine was built.
@@ -92,11 +92,11 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended according to the listing of its last history; None if the listing does not show it.
+    """Return how a run ended according to the listing of its last history; None if it is unknown.
 
     A leg that was told to stop has not ended the run, nor has a leg with a next leg.
     """
-    from pathlib import Path  # imported here for start-up
+    from pathlib import Path  # imported here to start faster
 
     match = re.fullmatch(_HISTORY, history)
     if match is None:
@@ -124,7 +124,7 @@ def _read_ends(path: str) -> tuple[bytes, bytes]:
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
-    """Return what shows that an engine that switches rigid bodies is older than the fix; empty if nothing does."""
+    """Return the evidence that an engine that switches rigid bodies is older than the fix; empty without any."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
     commit = re.search(_COMMIT, head)
@@ -213,7 +213,7 @@ def _read_listing(path: str) -> bytes:
 
 
 def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing, 0 for a number that is not there."""
+    """Return the CPU times of a Radioss listing, 0 for a missing number."""
     summary = data[data.rindex(_SUMMARY) :]
     numbers = []
     for pattern in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES):
@@ -224,7 +224,7 @@ def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
 
 
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a d3hsp (elapsed times if these are rounded to 0), without the time before the run."""
+    """Return the CPU times of a d3hsp (elapsed times if they are rounded to 0), without initialisation."""
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
     total = re.search(_D3HSP_TOTAL, table)
@@ -293,7 +293,7 @@ def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float
 
 
 def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
-    """Return part id and step, 0 for a step that is cut."""
+    """Return part id and step, 0 for a truncated step."""
     try:
         return int(part), float(step)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The quantity that a column, curve or dataset contains, recognised by its name in tables, HDF5 and solver databases.
+"""Recognise the quantity of a column, curve or dataset by its name in tables, HDF5 and solver databases.
 
 A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are searched among these words,
 the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
@@ -24,12 +24,12 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match: the quantity only; with words for the whole model; with words for something else.
+# Ranks of a match, best first: only the quantity; with words for the whole model; with words for something else.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
 
-# Words that name the whole model, or the file or group that a quantity comes from.
+# Words for the whole model, or for the file or group of a quantity.
 _WHOLE_MODEL_WORDS: Final = frozenset(
     {"global", "globals", "globale", "total", "totals", "totale", "totaal", "whole", "complete", "entire", "all",
      "model", "modell", "modele", "modelo", "system", "sys", "sum", "summe", "gesamt", "gesamte", "gesamtes",
@@ -49,9 +49,9 @@ _TIME_WORDS: Final = frozenset(
 # "2. Kinetic energy", "Curve 2: KE"
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
 _SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
-# Last steps of a path whose quantity is named by the group: H5MD and others.
+# Last components of a path whose group names the quantity: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-# Datasets next to the values that are no quantities.
+# Datasets next to the values that are not quantities.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
@@ -60,9 +60,9 @@ _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
-_LONGEST_PHRASE: Final = 5  # words
+_LONGEST_PHRASE: Final = 5  # largest number of words in a name of a quantity
 
-# Words that make an internal energy something else; KE in capitals only, since "make" contains it too.
+# Words that give an internal energy another meaning; KE in capitals only, since "make" contains it too.
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
@@ -97,7 +97,7 @@ def _list_phrases() -> Iterator[tuple[str, str]]:
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
 def find_meaning(name: str) -> Meaning | None:
     """Return the quantity that a name means, with its rank; None if there is none, or several.
 
@@ -126,7 +126,7 @@ def find_meaning(name: str) -> Meaning | None:
 
 
 def _split_words(name: str) -> list[str]:
-    """Cut a name into lower-case words without accents and unit; "totalKineticEnergy" becomes three words."""
+    """Split a name into lower-case words without accents and unit; "totalKineticEnergy" becomes three words."""
     text = _CAMEL_CASE.sub(" ", remove_unit(_NUMBERING.sub("", name)))
     text = text.casefold().translate(_PLAIN_LETTERS)
     return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
@@ -178,7 +178,7 @@ def is_time(name: str) -> bool:
 
 
 def is_internal_energy(name: str) -> bool:
-    """Return True if a name means internal energy and has no other words."""
+    """Return True if a name means internal energy without any other words."""
     return find_meaning(name) == Meaning("internal_energy", EXACT)
 
 
@@ -195,7 +195,7 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that mean internal energy and have no other words, or else of all that mean it.
+    """Return the indices of names that mean internal energy without other words, or else of all that mean it.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -205,7 +205,9 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        is_other = re.search(_OTHER_QUANTITY, name)  # "dissipated internal energy"
+        is_other = re.search(
+            _OTHER_QUANTITY, name
+        )  # such as "dissipated internal energy"
         if meaning.rank == EXACT:
             exact.append(index)
         elif meaning.rank == WHOLE_MODEL or not is_other:
@@ -214,7 +216,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
 
 
 def find_quantity(name: str) -> str | None:
-    """Return which of `QUANTITIES` of the whole model a channel of this name contains, None for any other name.
+    """Return the quantity of the whole model in `QUANTITIES` that a name means, None for any other name.
 
     Examples
     --------
@@ -228,7 +230,7 @@ def find_quantity(name: str) -> str | None:
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return, for each of `QUANTITIES`, the names of the best rank that mean it.
+    """Return, for each of `QUANTITIES`, the names of the best rank.
 
     If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
     the table. A column named "total" contains the total energy if there is a kinetic energy too.
@@ -261,7 +263,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words for the owner of the only internal energy; () if there are several energies or no such words."""
+    """Return the words for the owner of the only internal energy; () if there are several, or no such words."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
@@ -306,7 +308,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    if normalise_name(name) == ROTATION_ENERGY:  # added to the kinetic energy
+    if normalise_name(name) == ROTATION_ENERGY:  # contained in the kinetic energy
         return False
     meaning = find_meaning(name)
     if meaning is not None:
@@ -315,7 +317,7 @@ def _has_name_of_energy(name: str) -> bool:
 
 
 def note_other_quantity(channel: str) -> tuple[str, ...]:
-    """Return a note if a channel that is used as internal energy has the name of something else.
+    """Return a note if the channel used as internal energy has the name of another quantity.
 
     Examples
     --------
@@ -333,7 +335,7 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
-    """Raise FormatError if the only column or curve of a file has the name of something other than internal energy."""
+    """Raise FormatError if the only column or curve of a file is named as another quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
         problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
@@ -341,7 +343,7 @@ def refuse_other_quantity(channel: str, where: str) -> None:
 
 
 def _find_word_of_other_quantity(channel: str) -> str:
-    """Return the word that makes a name mean something other than internal energy, or an empty string."""
+    """Return the word that gives a name another meaning than internal energy, or an empty string."""
     meaning = find_meaning(channel)
     is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE
     if meaning and meaning.quantity == "internal_energy" and is_known:

@@ -1,4 +1,4 @@
-"""The names of columns, units and parts, and which of them the user selects."""
+"""Interpret the names of columns, units and parts, and which of them the user selects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
 
-# Names are `normalised`, and compared as a whole.
+# Names are normalised, and compared as a whole.
 TIME_NAMES: Final = frozenset(
     {"time", "t", "times", "timewhole", "zeit", "temps", "tempo", "tiempo", "tijd", "tid", "czas", "时间", "時間",
      "시간", "время"}
@@ -40,10 +40,9 @@ INTERNAL_ENERGY: Final = frozenset(
      "внутренняяэнергия", "内部エネルギー", "内能", "내부에너지"}
 )  # fmt: skip
 
-# Other quantities of the whole model by their names in glstat and binout of LS-DYNA, Radioss and its th_to_csv, Abaqus,
-# Exodus, frames of lasso-python and d2rpick, and in other languages.  Energies [energy], momentum and velocity of the
-# centre of mass along an axis [momentum], [velocity], and the mass of what moves [mass].  The artificial energy of
-# Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
+# Names of other quantities of the whole model: energies, momentum, velocity and mass of the moving parts.
+# They come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
+# The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
         {"kineticenergy", "energykinetic", "kinetic", "ke", "allke", "kinen", "kinenergy", "energykin", "kine", "ekin",
@@ -132,7 +131,7 @@ def _drop_unit(brackets: re.Match[str]) -> str:
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
-@lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
 def normalise_name(name: str) -> str:
     """Reduce a name to its letters and digits, in lower case and without its unit.
 
@@ -155,7 +154,7 @@ def is_unit(cell: str) -> bool:
 
 
 def match_names(wanted: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that ``wanted`` means: literally, else in other case, else without unit."""
+    """Return the indices of the names that match ``wanted``: literally, else ignoring case, else ignoring the unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
@@ -230,7 +229,7 @@ def number_in_family(name: str, first: str) -> int | None:
 
 
 class Part(NamedTuple):
-    """A part of the model, with the number and the title in the files of the solver."""
+    """A part of the model, with its number and title in the files of the solver."""
 
     id: int
     title: str
@@ -329,7 +328,7 @@ def _match_parts(
 def _match_piece(
     piece: str, parts: Sequence[Part], titled: Sequence[Part] | None, where: str
 ) -> Sequence[Part]:
-    """Return the parts that a number, range or title selects; ``titled`` are the parts with that title."""
+    """Return the parts selected by a number, range or title; ``titled`` are the parts with that title."""
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
@@ -361,13 +360,13 @@ def _choose_only_part(titled: Sequence[Part], text: str, where: str) -> Part:
 
 
 def list_parts(parts: Sequence[Part]) -> str:
-    """Return number and title of some parts for a message."""
+    """Return number and title of parts for a message."""
     return list_names(
         [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
     )
 
 
 def has_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
-    """Return True if texts contain the word "recommended", and it is not the title of a part."""
+    """Return True if texts contain the word "recommended", unless it is the title of a part."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

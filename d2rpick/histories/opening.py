@@ -1,4 +1,4 @@
-"""Opening a run: the reader of each file is found by the content of the file."""
+"""Open a run: find the reader of each file by its content."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ __all__ = [
     "open_sources",
 ]
 
-# Bytes that contain the head of a file and more than one state of the longest blocks.
+# Bytes that contain the header of a file and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
 _LONGEST_LEGEND: Final = 1 << 24  # bytes; the legend of an ASCII database is shorter
-_DIGITS: Final = "0123456789"  # of the number of a later file of a family
+_DIGITS: Final = "0123456789"  # digits of the number of a later file of a family
 
 # Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
 _SAME = 0.01
@@ -156,7 +156,7 @@ def _reopen(
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Sort the files of a run by their formats; return notes on files of a pattern that are left out.
+    """Group the files of a run by format; return notes on files of a pattern that are left out.
 
     Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
     later files of a family have the format of its first file.
@@ -214,10 +214,10 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats with those last that contain forces only; raise FormatError if all do."""
+    """Return the formats with force-only formats last; raise FormatError if all are."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # the branch reports best what is missing
+        # the branch gives the best message about missing data
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
@@ -328,14 +328,14 @@ def _detect_format(source: Source) -> str:
 
 def _refuse_foreign(name: str, head: bytes) -> None:
     """Raise FormatError for a file of a known format without an energy history."""
-    # imported here: databases of solvers do without
+    # imported here: solver databases do not need it
     from d2rpick.histories.foreign import refuse_foreign
 
     refuse_foreign(name, head)
 
 
 def _head_of(source: Source) -> bytes:
-    """Return the first bytes of a file, with some after the legend of an ASCII database of LS-DYNA."""
+    """Return the first bytes of a file, with bytes after the legend of an ASCII database of LS-DYNA."""
     head = source.data[:_HEAD]
     if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
         end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
@@ -368,7 +368,7 @@ def check_legs(legs: Sequence[Database]) -> None:
         if both_hold and held_by_first.isdisjoint(held_by_second):
             raise FormatError(
                 f"{first.source} and {second.source} have neither a column nor a part in common, "
-                "legs of one run were expected; give the files of one run"
+                "restart segments of one run were expected; give the files of one run"
             )
         for times, columns in (
             (_list_model_times, _read_model_energies),
@@ -386,7 +386,7 @@ def check_legs(legs: Sequence[Database]) -> None:
             if not are_alike:
                 raise FormatError(
                     f"{first.source} and {second.source} have different energies at the same times, "
-                    "legs of one run were expected; give the files of one run"
+                    "restart segments of one run were expected; give the files of one run"
                 )
 
 
@@ -406,13 +406,13 @@ def _list_part_times(leg: Database) -> Samples:
 
 
 def _read_model_energies(leg: Database, states: Indices) -> Samples:
-    """Return the internal energy of the whole model at some states, (states,), or an array (states, 0)."""
+    """Return the internal energy of the model at given states, (states,), or an empty array (states, 0)."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 
 
 def _read_part_energies(leg: Database, states: Indices) -> Samples:
-    """Return the internal energies of the compared parts at some states, shape (states, parts)."""
+    """Return the internal energies of the compared parts at given states, shape (states, parts)."""
     ids = [part.id for part in leg.parts][:_COMPARED]
     return leg.part_channel("internal_energy", ids)[states]
 
@@ -420,7 +420,7 @@ def _read_part_energies(leg: Database, states: Indices) -> Samples:
 def _find_shared_states(
     first: Samples, second: Samples
 ) -> tuple[Indices, Indices] | None:
-    """Return the states at common times: all if both legs begin together, else only the start of the later leg."""
+    """Return the states at common times: all if both legs begin together, else the start of the later leg."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
         return None

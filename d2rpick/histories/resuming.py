@@ -1,4 +1,4 @@
-"""Reading on in files that grow: a later read takes the head of a file and its last states, not all states again."""
+"""Continue reading growing files: a later read uses the header of a file and its last states only."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ResumePoint(NamedTuple):
     end: int
 
     def read_on(self, name: str) -> bytes:
-        """Return the head and the bytes of a file from ``begin`` on; OSError if it cannot be read."""
+        """Return the header, and the bytes of a file from ``begin`` on; OSError if it cannot be read."""
         with open(name, "rb") as stream:  # noqa: PTH123  start-up
             stream.seek(self.begin)
             return self.head + stream.read()

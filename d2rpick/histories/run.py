@@ -1,4 +1,4 @@
-"""All files of one run, and the energy in them that is to be locked in."""
+"""Represent all files of one run, and select the energy in them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class OpenedRun:
-    """The databases of one run, one for each format, the most comprehensive one first.
+    """The databases of one run, one per format, the most comprehensive one first.
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
@@ -176,7 +176,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            return None  # it cannot show what flies together
+            return None  # this database cannot show which parts fly together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
         return Momenta(
@@ -219,7 +219,7 @@ class OpenedRun:
         return np.where(massless, 0.0, ratios)
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
-        """Return the masses of the parts; for an unknown one, the least with its momentum and kinetic energy."""
+        """Return the part masses; an unknown mass is the smallest with its momentum and kinetic energy."""
         from d2rpick.histories.balance import compute_least_masses
 
         masses = self._masses(momenta, holder)
@@ -255,7 +255,7 @@ class OpenedRun:
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the momentum of some parts together, or of the whole model; None if it is not written."""
+        """Return the total momentum of given parts, or of the whole model; None if it is not written."""
         of_parts = parts is not None
         for momenta in self.momenta(parts, None):
             if (momenta.parts is not None) == of_parts:
@@ -273,18 +273,18 @@ class OpenedRun:
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
-        # None if the energies are not in every state
+        # None if the energies are missing in some states
         energies = give_if_written(lambda: self.part_energies(parts)) if parts else None
         if energies is None:
             return ()
         return find_springs(self.databases, parts, energies, self.part_time)
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return internal energies of some parts, shape (n, parts), at the times of the parts [energy]."""
+        """Return internal energies of given parts, shape (n, parts), at the times of the parts [energy]."""
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of some parts, shape (n, parts) [energy]; FormatError if they are not written."""
+        """Return kinetic energies of given parts, shape (n, parts) [energy]; FormatError if not written."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
@@ -295,13 +295,15 @@ class OpenedRun:
                 continue
             for quantity in QUANTITIES:
                 if quantity in database.quantities and quantity not in columns:
-                    with suppress(FormatError):  # it is not in every state
+                    with suppress(
+                        FormatError
+                    ):  # the quantity is missing in some states
                         name = database.quantities[quantity]
                         columns[quantity] = database.channel(name)
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Return the mean of the centres of some parts [length]; None if they are not written."""
+        """Return the mean of the centres of given parts [length]; None if they are not written."""
         components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
@@ -310,7 +312,7 @@ class OpenedRun:
         return Track(self.part_time, np.stack(components, axis=1))
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
-        """Return a quantity of some parts, shape (n, parts)."""
+        """Return a quantity of given parts, shape (n, parts)."""
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
@@ -333,10 +335,10 @@ class OpenedRun:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """Return the database with parts; raise FormatError, with what there is instead, if there is none."""
+        """Return the database with parts; without one, FormatError names what exists instead."""
         holder = self._with_parts()
         if holder is None:
-            # the database reports best why it has no parts
+            # the database gives the best message about missing parts
             self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
@@ -350,13 +352,13 @@ class OpenedRun:
     def _of_parts(
         self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
     ) -> History:
-        """Return the history of the summed energy of parts; that of springs is left out unless it is all."""
+        """Return the history of the summed energy of parts, without springs unless only they have energy."""
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        if not energies[:, ~left_out].any():  # only springs have energy
+        if not energies[:, ~left_out].any():  # true if only springs have energy
             left_out[:] = False
         idle = [
             part
@@ -383,7 +385,7 @@ class OpenedRun:
         )
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the whole model without the energy of springs and dampers, if it has other energy."""
+        """Return the history of the whole model without the energy of springs and dampers, unless it is all."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -439,7 +441,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # the database reports best why it has no channels
+                    # the database gives the best message about missing channels
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
@@ -470,7 +472,7 @@ class OpenedRun:
 
 
 class _Written(Given):
-    """The evidence in the files of a run for some parts, read at the first request."""
+    """The evidence in the files of a run for given parts, read on request."""
 
     def __init__(
         self,
@@ -503,12 +505,12 @@ class _Written(Given):
         return read_terms(self._run.databases)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
-        """Return internal energies of some parts; None if they are not written."""
+        """Return internal energies of given parts; None if they are not written."""
         values = give_if_written(lambda: self._run.part_energies(parts))
         return None if values is None else Track(self._run.part_time, values)
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the kinetic energy of some parts together, or of the whole model; None if it is not written."""
+        """Return the total kinetic energy of given parts, or of the model; None if it is not written."""
         if parts is None:
             return super().kinetic_energy(parts)
         values = give_if_written(lambda: self._run.part_kinetic_energies(parts))
@@ -518,7 +520,7 @@ class _Written(Given):
 
 
 def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
-    """Return the channels used as energy, and those that could have been: all other internal energies."""
+    """Return the channels used as energy, and all other internal energies."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
         return [*(database.find(name) for name in selection.energy), *passed_over]
@@ -545,7 +547,7 @@ def _note_left_out_springs(springs: str) -> str:
 
 
 def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms (n, k) of a summed energy that are not always zero; a single term is the energy itself."""
+    """Add the terms (n, k) of a summed energy that are not always zero; a single term is returned as it is."""
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:
         return history

@@ -1,4 +1,4 @@
-"""Functions of sampled curves: valid states, integral, crossings of a level, turning points, outline, roots."""
+"""Compute with sampled curves: valid states, integral, level crossings, turning points, outline, roots."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# If at least this share of the states repeats the time of the state before, a table may have rows for several parts.
+# If at least this share of the states repeats the time of the state before, a table may have rows for parts.
 _REPEATED: Final = 0.49
-FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be chance
-# Ratio of output intervals before and after a restart; another curve or an unsorted table has another interval.
+FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be accidental
+# Ratio of output intervals before and after a restart; other curves or unsorted tables exceed it.
 _ALIKE = 2.0
-# Number of adjacent windows that are combined into one; with eight the table of them stays small and quick to search.
+# Number of adjacent windows that are combined into one; eight keep the table small and quick to search.
 _TOGETHER: Final = 8
-# A root that moves by less than this share of its time has converged to rounding.
+# A root has converged if it moves by less than this share of its time, which is rounding.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
-HALVINGS: Final = 50  # halvings of a bracket down to rounding
+HALVINGS: Final = 50  # bisections of a bracket down to rounding
 
 
 def find_window(time: Samples, start: float, end: float) -> slice:
@@ -41,7 +41,7 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and the last of the times (n,), empty if there are none; they identify a window of a record."""
+    """Return the first and last of the times (n,), empty if there are none; they identify a window of a record."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 
@@ -62,7 +62,7 @@ def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
 
 
 def compute_median(values: Samples) -> Samples:
-    """Return the median of values (n,) or (n, k) over the first axis; the one of numpy imports masked arrays.
+    """Return the median of values (n,) or (n, k) over the first axis; numpy's median imports masked arrays.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # the usual case
+    if np.all(time[1:] > time[:-1]):  # the usual case: ascending times
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
     equal = int(np.count_nonzero(step == 0))
@@ -131,13 +131,14 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps} (restart); if legs overlap the newer one is used, {dropped} dropped"
+            f"time steps back {steps} (restart); the newer restart segment is used where they "
+            f"overlap, {dropped} dropped"
         )
     return keep, tuple(notes)
 
 
 def count_rows_per_time(time: Samples) -> int:
-    """Return the median number of rows with the same time (n,); 1 if most times are in one row only.
+    """Return the median number of rows with the same time (n,); 1 if most times occur in one row only.
 
     Examples
     --------
@@ -196,7 +197,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median of the steps above 0 (equal printed times are no interval); NaN if there are none."""
+    """Return the median of the positive steps (equal printed times are no interval); NaN without any."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 
@@ -233,7 +234,7 @@ def find_crossings(
     turn = np.flatnonzero(np.diff(side[off_level]))
     index_before = off_level[turn]
     index_after = off_level[turn + 1]
-    # if there are samples on the level in between, the crossing is at the first of them: a share of 1
+    # if there are samples on the level, the crossing is at the first of them: a share of 1
     share = np.where(
         index_after == index_before + 1,
         (level - energy[index_before])
@@ -320,7 +321,7 @@ def find_first_above(
 
 
 def merge_times(*times: Samples) -> Samples:
-    """Return all times once, ascending; the function of numpy for this imports numpy.ma, which slows start-up.
+    """Return all times once, ascending; numpy's function imports numpy.ma, which slows the start.
 
     Examples
     --------
@@ -332,7 +333,7 @@ def merge_times(*times: Samples) -> Samples:
 
 
 def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
-    """Return times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
+    """Return times and values that draw the curve, shape (2, m): all, or the extremes of many intervals.
 
     Parameters
     ----------
@@ -373,7 +374,7 @@ def narrow_brackets(
     slope: Callable[[Samples], Samples] | None = None,
     steps: int = HALVINGS,
 ) -> Roots:
-    """Narrow brackets around the roots at which ``inside`` changes from positive to not positive.
+    """Narrow brackets around the roots at which ``inside`` changes from positive to non-positive.
 
     Parameters
     ----------

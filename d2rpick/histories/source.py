@@ -1,4 +1,4 @@
-"""The files of a history and their bytes: files, folders, globs, standard input."""
+"""Find the files of a history and read their bytes: files, folders, globs, standard input."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# File names of LS-DYNA's d3 families, with the job name before and the number in the family after them.
+# File names of LS-DYNA's d3 families: job name before, and number in the family after the name.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
 # File names of force listings, which are used next to files with energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 _BLOCK = 1 << 16  # packed bytes unpacked at a time, which become 68 MB at most
-# Least similarity of a file name that is suggested; names with the same suffix are similar already.
+# Smallest similarity of a suggested file name; names with the same suffix are similar already.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 
@@ -62,7 +62,7 @@ class Source(NamedTuple):
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
-    """Replace folders and globs by their files, and keep the order otherwise.
+    """Replace folders and globs by their files, and otherwise keep the order.
 
     Of a folder only databases of solvers are used, and they must belong to one run.
 
@@ -83,7 +83,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # checked whenever they are read
+    families = _open_families(files)  # families are checked whenever they are read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -107,7 +107,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
 
 
 def _open_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open the files of families by name, of which little is read."""
+    """Open the files of families by name; only small parts of them are read."""
     family = re.compile(_FAMILY)
     in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
     try:
@@ -157,7 +157,7 @@ def _report_empty(name: str) -> FormatError:
 
 def _list_files(name: str) -> Sequence[str]:
     """Return the files of a name: a file with the later files of its family, or those of a folder or pattern."""
-    # os.path instead of pathlib, for start-up
+    # os.path instead of pathlib, to start faster
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113
         return [name, *_list_later_files(name)]
     from pathlib import Path
@@ -165,7 +165,7 @@ def _list_files(name: str) -> Sequence[str]:
     path = Path(name)
     try:
         is_folder = path.is_dir()
-    except OSError:  # a name too long is reported when it is opened
+    except OSError:  # a name that is too long is reported when it is opened
         return [name]
     if is_folder:
         return _list_databases(path)
@@ -253,7 +253,10 @@ def _read_file(name: str) -> bytes | OnDisk:
     """Return the content of a file; raise FormatError if it cannot be read."""
     try:
         return open_content(name)
-    except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
+    except (
+        OSError,
+        ValueError,
+    ) as error:  # a name with a NUL character raises ValueError
         raise _report_unread(name, error) from None
 
 
@@ -286,7 +289,7 @@ def _suggest_file(name: str) -> str:
 
 
 def _unpack(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack gzip data, as far as they are whole, within the bounds of memory."""
+    """Unpack gzip data, as far as they are complete, within the limits of memory."""
     import zlib
 
     data = bytes(packed)
@@ -309,12 +312,12 @@ def _unpack(name: str, packed: bytes | OnDisk) -> Source:
 def _unpack_pieces(
     name: str, packed: bytes, *, keep: bool = True
 ) -> tuple[list[bytes], bool]:
-    """Unpack gzip files that follow each other; return their pieces, and True if the last file is cut."""
+    """Unpack consecutive gzip files; return their pieces, and True if the last file is truncated."""
     import zlib
 
     pieces: list[bytes] = []
     size = 0
-    unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
+    unpacker = zlib.decompressobj(wbits=31)  # 31 selects the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         unread = packed[end - _BLOCK : end]
         while unread:
@@ -333,8 +336,8 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return the files in the folders of these files with the same name and a higher number that were not named."""
-    from pathlib import Path  # imported here for start-up
+    """Return unnamed files in the folders of these files with the same name and a higher number."""
+    from pathlib import Path  # imported here to start faster
 
     legs: list[str] = []
     for name in names:
@@ -355,5 +358,5 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of the leg, 0 without a number."""
     match = _NUMBERED.fullmatch(name)
-    assert match is not None  # it matches any text
+    assert match is not None  # the pattern matches any text
     return match[1], int(match[2] or 0)

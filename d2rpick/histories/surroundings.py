@@ -1,4 +1,4 @@
-"""The forces from outside on the parts of a run: gravity, supports and imposed motions, as the deck defines them."""
+"""Represent the external forces on the parts of a run: gravity, supports and prescribed motions of the deck."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
-    """What acts from outside on each part, by part id, and on the whole model, by None.
+    """External forces on each part, by part id, and on the whole model, by None.
 
     ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
     accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if
@@ -36,19 +36,19 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Return the possible accelerations of some parts together, or of the model; None if they are unknown."""
+        """Return the possible accelerations of given parts, or of the model; None if they are unknown."""
         accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 
     def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
-        """Return the supports of some parts, or of the model."""
+        """Return the supports of given parts, or of the model."""
         supports: list[Support] = []
         for number in _list_ids(parts):
             supports += self.supports.get(number, ())
         return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
-        """Return a sentence on what holds some of these parts, or the model, at a time; None if nothing does."""
+        """Return a sentence about the support of given parts, or of the model, at a time; None without any."""
         for number in _list_ids(parts):
             for support in self.supports.get(number, ()):
                 if support.start <= time <= support.end:
@@ -61,7 +61,7 @@ class Surroundings:
     def free(
         self, parts: Iterable[Part] | None, time: float
     ) -> tuple[float, float] | None:
-        """Return the interval around ``time`` in which nothing holds these parts, or the model; None if it is held."""
+        """Return the interval around ``time`` in which these parts, or the model, have no support; None if held."""
         start, end = -inf, inf
         for support in self.supports_of(parts):
             if support.start <= time <= support.end:
@@ -77,5 +77,5 @@ UNKNOWN = Surroundings()
 
 
 def _list_ids(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
-    """Return the ids of some parts; None stands for the model."""
+    """Return the ids of parts; None stands for the model."""
     return (None,) if parts is None else tuple(part.id for part in parts)

@@ -1,4 +1,4 @@
-"""Contact forces in the columns of a table, recognised by the column names."""
+"""Read contact forces in the columns of a table, which are recognised by name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
 def find_forces(database: Legs) -> tuple[ContactForce, ...]:
-    """Return the forces of a database; in a table each column whose name says contact force is one."""
+    """Return the forces of a database; in a table each column named as a contact force is one."""
     if READERS[database.format].solver:
         return database.contact_forces
     names = [

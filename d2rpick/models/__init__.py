@@ -1,1 +1,1 @@
-"""Runs that the package computes itself: the published oscillator and the rollover box."""
+"""Compute example runs with the package itself: the published oscillator and the rollover box."""

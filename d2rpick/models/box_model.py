@@ -1,4 +1,4 @@
-"""The box, its step, the sled and the ground as a model at rest, and the resistance of its bars.
+"""Define the box, its step, the sled and the ground at rest, and the forces of the bars.
 
 The box is the cross-section of a thin-walled body in its plane of roll: an outer and an inner ring of mass points,
 connected by bars along both rings, across, and diagonally. So its walls bend, the frame racks, and it has twice as
@@ -25,15 +25,15 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# The step takes a quarter of the leading side, and at least one cell: least number of cells along a side.
+# The step takes a quarter of the leading side, and at least one cell, so this is the fewest cells along a side.
 _COARSEST = 4
-# Bars of a cell; the cells of the leading side come first, then those of the roof.
+# Bars per cell; the cells of the leading side come first, then those of the roof.
 _BARS = 5
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of box, sled and surroundings in SI units; RangeError if a number makes no model.
+    """Parameters of box, sled and surroundings in SI units; RangeError for a number without a valid model.
 
     The defaults are a narrow box on the standard dolly. Only two times were used to tune them: the trip ends at about
     85 ms and the box lands at 380 ms, as in the published study, which states no other figure of its model.
@@ -125,7 +125,7 @@ class Truss(NamedTuple):
 
 
 class Structure(NamedTuple):
-    """Points at ``places`` (n,) with ``masses``, the first ``of_box`` of them in the box, and the bars of box and step.
+    """Points at ``places`` (n,) with ``masses``, the first ``of_box`` of them in the box, and all bars.
 
     The outer ring comes first. ``skin`` are the points that may touch floor and ground, ``toes`` those that may meet
     the curb.
@@ -234,7 +234,7 @@ class Bars:
         self._stiffness, self._strength = truss.stiffness, truss.strength
         self.rest = truss.rest.copy()
         self.plastic_work = 0.0
-        # a bar pulls its first point towards its second, and the second back
+        # a bar pulls its first point towards its second, and vice versa
         self._pulls = np.zeros((points, truss.rest.size))
         self._pulls[self._first, np.arange(truss.rest.size)] = 1.0
         self._pulls[self._second, np.arange(truss.rest.size)] = -1.0
@@ -274,7 +274,7 @@ class Bars:
         rest: Values | None = None,
         plastic_work: Values | None = None,
     ) -> Values:
-        """Return elastic energy plus plastic work, as solvers report it, of the present or a past state (...) [J]."""
+        """Return elastic energy plus plastic work of the present or a past state (...) [J]."""
         return self.elastic_energy(positions, rest) + (
             self.plastic_work if plastic_work is None else plastic_work
         )

@@ -1,4 +1,4 @@
-"""The motion of the box by explicit central differences: contact with sled and ground, and its bars or one rigid body.
+"""Integrate the motion of the box by central differences, with contact, as bars or as one rigid body.
 
 The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at small speeds. The
 cushion of the curb crushes like honeycomb: at a constant force, irreversibly, until its depth is used up. In a drop
@@ -26,8 +26,8 @@ from d2rpick.models.box_model import (
     compute_stiffest_rate,
 )
 
-# Stiffness of floor and curb at one point [N/m]: softer than the box, so that contact does not determine the time step;
-# the weight of the box sinks in by 0.5 mm.
+# Stiffness of floor and curb at one point [N/m]: softer than the box, so that contact does not limit the time step.
+# The weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
 # Below this sliding speed friction is proportional to it [m/s]: 1/100 of the speeds in the model.
 SLIP = 0.1
@@ -35,15 +35,15 @@ SLIP = 0.1
 DEEPEST = 0.1
 # Thickness of the curb [m], behind which the sled ends.
 CURB_THICKNESS = 0.05
-# No point approaches floor, curb or ground faster than this many times the initial speed, plus the speed after a fall
-# of 1 m [m/s], plus twice the speed of the drop: gives the time in which no contact is possible.
+# Bound of the speed towards floor, curb or ground: this many times the initial speed, plus the speed after a fall
+# of 1 m [m/s], plus twice the speed of the drop. It gives the time in which no contact is possible.
 FASTEST, FALL = 4.0, 5.0
-# Pushes within this time are one contact [s]: corners rattle, a flight takes longer.
+# Contact forces within this time are one contact [s]: corners rattle, a flight takes longer.
 SAME_CONTACT = 2e-3
 
-# Safety factor of the time step on 2/omega, the limit of linear bars: these bars rotate, yield and touch.
+# Safety factor of the time step on 2/omega, the limit of linear bars, since bars rotate, yield and touch.
 _SAFETY = 0.9
-# Times within this share of a time step count as a multiple of it, since they are written in decimals.
+# Times within this share of a time step are multiples of it, since they are written as decimals.
 _SAME = 1e-6
 
 
@@ -150,13 +150,13 @@ class Contact:
         )
 
     def _on_all(self, face: Face, points: Ends) -> Face:
-        """Return forces on some points as forces on all points."""
+        """Return forces on selected points as forces on all points."""
         forces = np.zeros((2, self._points), dtype=np.complex128)
         forces[:, points] = face
         return Face(*forces)
 
     def _gap(self, positions: Plane, on_sled: Plane) -> float:
-        """Return the least distance that the nearest point must move before it can touch [m]."""
+        """Return the smallest distance that the nearest point must move before it can touch [m]."""
         to_ground = float(positions[self._skin].imag.min()) + self._p.ground
         if self._p.drop is not None:
             return to_ground
@@ -201,7 +201,7 @@ class Contact:
 
 
 class RigidPoints:
-    """Points that move as one body, with the momenta that they had when they were switched.
+    """Points that move as one body, with the momenta that they had at the switch.
 
     ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
     ``spin`` from x to z [rad/s].
@@ -217,7 +217,7 @@ class RigidPoints:
 
     @property
     def places(self) -> Plane:
-        """Places of the points [m]."""
+        """Positions of the points [m]."""
         return self.centre + self.arms
 
     @property
@@ -260,7 +260,7 @@ class Accounts:
 
 
 class BoxMotion:
-    """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step before it.
+    """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
     A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError if that is impossible. ``body`` is
     the box while it is rigid, else None.
@@ -292,7 +292,7 @@ class BoxMotion:
 
     @property
     def time(self) -> float:
-        """Time of the places [s]."""
+        """Time of the positions [s]."""
         return self.count * self.dt
 
     def step_at(self, time: float) -> int:
@@ -304,8 +304,8 @@ class BoxMotion:
         return copy.deepcopy(self)
 
     def make_rigid(self) -> None:
-        """Switch the box to a rigid body: its momenta are kept, its vibration stops, its deformation is frozen."""
-        # a last evaluation, so that bars that yield now do so before they are frozen
+        """Make the box rigid: it keeps its momenta, its vibration stops, and its deformation is frozen."""
+        # a last evaluation, so that yielding bars yield before they are frozen
         self.box.forces(self.places)
         of_box = slice(self.structure.of_box)
         masses = self.structure.masses[of_box]
@@ -320,7 +320,7 @@ class BoxMotion:
         )
 
     def make_deformable(self) -> None:
-        """Switch back: the points continue with the motion of the body, the bars with the elongations they had."""
+        """Make the box deformable again: the points continue the motion of the body, the bars keep their lengths."""
         self.body = None
 
     def advance(self) -> Plane:
@@ -355,7 +355,7 @@ class BoxMotion:
         self.count += 1
 
     def _account(self, mean: Plane, outer: Plane, push: Push | None) -> None:
-        """Add what acted from outside during a time step, with the mean velocities over it."""
+        """Add the external work and impulse of a time step, with the mean velocities over it."""
         accounts = self.accounts
         dt = self.dt
         momenta = self.structure.masses * mean

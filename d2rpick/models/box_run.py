@@ -1,4 +1,4 @@
-"""Runs of the box from start to end, switched or not, their records, and scans over tr."""
+"""Compute runs of the box from start to end, switched or not, their records, and scans over tr."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Number of states whose results are computed together: for a single one, calling numpy would take most of the time.
+# Number of states whose results are computed at once: for a single state, numpy calls would take most of the time.
 _BLOCK: Final = 256
 
 # Default output interval [s]: 25 states in a period of a 400 Hz mode, and not much longer than a time step.
 INTERVAL = 1e-4
-# Limit of time steps, which take some minutes; more are hardly intended.
+# Limit of time steps, which take minutes; more are hardly intended.
 MOST_STEPS = 5_000_000
-# Distance between the times of a scan [s] while the load may last and after it, and of the last one before td.  In the
-# flight the energy vibrates at 40 Hz, twice the lowest mode: six times in each period resolve it.
+# Time between the values of tr in a scan [s]: while the load may last, after it, and before td at the end.
+# In the flight the energy vibrates at 40 Hz, twice the lowest mode: six values per period resolve it.
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
@@ -74,12 +74,12 @@ class Record(NamedTuple):
 
     @property
     def landed(self) -> float | None:
-        """Time at which the ground first pushed [s]; None if it never did."""
+        """Time of the first contact force of the ground [s]; None without one."""
         return self.landings[0][0] if self.landings else None
 
     @property
     def total_energy(self) -> Values:
-        """Present and dissipated energy (n,) [J], as a solver adds it up: without the energy lost at tr."""
+        """Present and dissipated energy (n,) [J], as a solver sums it, without the energy lost at tr."""
         present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
             present + self.friction_energy + self.wall_energy + self.damping_energy
@@ -256,7 +256,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # an overflow shows in the number of time steps below
+    # the number of time steps below shows an overflow
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -279,7 +279,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid = {motion.step_at(window.tr) for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
-    # infinite numbers are refused by the recorder
+    # the recorder refuses infinite numbers
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:

@@ -1,4 +1,4 @@
-"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file that ``--weights`` reads."""
+"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file for ``--weights``."""
 
 from __future__ import annotations
 

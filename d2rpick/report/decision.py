@@ -1,4 +1,4 @@
-"""Write the verdict on a pair of times: what to do, why, what to expect after td, and what would be better."""
+"""Write the verdict on a pair of times: what to do, why, what to expect after td, and how to improve it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
-    """Return what to do with a pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with a pair, why, and how to improve it, as pairs of a name and a sentence."""
     lines = [
         (decision.verdict, f"tr = {tr:.6g}, td = {td:.6g}"),
         ("why", decision.reason),
@@ -41,7 +41,7 @@ def list_statements(decision: Decision) -> Lines:
     worth = decision.quality.worth
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
     if worth:
-        share = f"; its error holds at most {worth.share:.2%} of the energy of the next contact"
+        share = f"; its error is at most {worth.share:.2%} of the energy of the next contact"
     else:
         share = ""
     return [
@@ -54,7 +54,7 @@ def list_statements(decision: Decision) -> Lines:
 
 
 def explain_grade(grade: Grade, decision: Decision) -> str:
-    """Return why a grade is not better and what would improve it, unless the verdict already says so."""
+    """Return why a grade is not better and how to improve it, unless the verdict already says so."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
@@ -101,4 +101,4 @@ def format_saving(best: Candidate) -> str | None:
 
 def format_saved_share(run_time_share: float) -> str:
     """Return how much CPU time is saved if ``run_time_share`` of it remains."""
-    return f"about {1 - run_time_share:.0%} of the processor time"
+    return f"about {1 - run_time_share:.0%} of the CPU time"

@@ -22,7 +22,7 @@ _LEG: Final = row(
     Field("kind", "text", "load, probe or rigid"),
     Field("length", "number"),
     Field("cycles", "integer?"),
-    Field("cpu", "number?", "processor time [s]"),
+    Field("cpu", "number?", "CPU time [s]"),
 )
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
@@ -94,10 +94,10 @@ def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def list_savings(answer: Driven) -> list[tuple[str, str]]:
-    """Return what was saved and what to keep in mind, as pairs of a name and a sentence."""
+    """Return the savings and remarks, as pairs of a name and a sentence."""
     words = zip(
         answer.saved,
-        ("by the cost model", "by the processor time of its legs"),
+        ("by the cost model", "by the CPU time of its engine runs"),
         strict=True,
     )
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]

@@ -1,4 +1,4 @@
-"""Build the interactive part of a page: the user drags, types or steps td, and everything that depends on td follows.
+"""Build the interactive part of a page, which updates everything that depends on td when the user changes td.
 
 Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
 that every page has.
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of intervals for which the lowest and highest energy is drawn: in the view, and in the overview of the run.
+# Number of intervals for which the lowest and highest energy is drawn, in the view and in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
 # Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
@@ -63,7 +63,7 @@ _VALUES: Final[Mapping[str, str]] = {
     "run_time": "saves",
     "level": "energy at td",
     "tolerance": "timing tolerance",
-    "windows": "acceptable tr",
+    "windows": "admissible tr",
     "reason": "no tr",
 }
 # Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
@@ -124,7 +124,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
         if len(flights) > 1
         else "",
         unit=join([f" [{unit}]"] if unit else []),
-        windows=make_element("li", make_element("i", class_="windows"), "acceptable tr")
+        windows=make_element("li", make_element("i", class_="windows"), "admissible tr")
         if "windows" in known_values
         else "",
         below_energy=below[0],
@@ -262,7 +262,7 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
 
 
 def _compute_saved_percentage(offer: Offer) -> float | None:
-    """Return what a pair saves [%]: of the CPU time, or of the simulated time if the cost of the parts is unknown."""
+    """Return the saving of a pair [%]: of the CPU time, or of the simulated time without part costs."""
     share = offer.saving
     if offer.best and share is None:
         share = offer.best.rigid_fraction
@@ -304,12 +304,12 @@ def _name_saving(offers: Sequence[Offer]) -> str:
     """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
-        return "saved, % of the processor time"
+        return "saved, % of the CPU time"
     return "rigid, % of the simulated time"
 
 
 def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
-    """Return all texts shown for a td, worded like those of ``suggest --td``; None for what is unknown."""
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
     best = offer.best
     decision = offer.decision_with_cure
     return {
@@ -358,14 +358,14 @@ def _format_for_screen_reader(offer: Offer) -> str:
     """Return the quality as a sentence for screen readers."""
     best = offer.best
     if best is None:
-        return "nothing acceptable"
+        return "no admissible tr"
     if best.residual is not None:
         return f"residual {format_measure(best.residual)}"
     return offer.decision.verdict if offer.decision else ""
 
 
 def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
-    """Describe what an offer costs and gains compared with the offer shown first."""
+    """Describe the loss and gain of an offer compared with the offer shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td
@@ -381,7 +381,7 @@ def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
         )
     if offer.saving is not None and start.saving is not None:
         comparisons.append(
-            f"saves {offer.saving:.1%} of the processor time instead of {start.saving:.1%}"
+            f"saves {offer.saving:.1%} of the CPU time instead of {start.saving:.1%}"
         )
     if (
         offer.error is not None

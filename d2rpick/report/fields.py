@@ -1,4 +1,4 @@
-"""Define the fields of results: each key once, with its kind, its meaning and where its value comes from.
+"""Define the fields of results: each key once, with its kind, its meaning and the source of its value.
 
 A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
 ``d2rpick/schemas``.  Keys are only ever added.
@@ -15,7 +15,7 @@ from d2rpick.report import tables
 
 
 class Kind(NamedTuple):
-    """The kind of values that a key has: ``schema`` describes it to a validator, ``plain`` converts a value to JSON.
+    """The kind of values of a key: ``schema`` describes it to a validator, ``plain`` converts a value to JSON.
 
     Within ``schema`` other kinds stand for their schemas; a kind with a ``name`` becomes a definition that others refer
     to.  A row (an object) has ``fields`` in display order.
@@ -42,7 +42,7 @@ class Kind(NamedTuple):
         return next(field for field in self.fields if field.key == key)
 
 
-# Kinds that many fields use; with a question mark they may be None. A size is a number that is not negative.
+# Kinds that many fields use; with a question mark they may be None. A size is a non-negative number.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -62,11 +62,11 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Return the field's value of an object as JSON holds it."""
+        """Return the field's value of an object in its JSON form."""
         return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
-        """Return the field's value as the object holds it."""
+        """Return the field's value as it is in the object."""
         if self.get:
             return self.get(thing)
         if isinstance(thing, Mapping):

@@ -35,22 +35,24 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
+# Colour of what has no verdict: admissible times, rigid windows of a finished run.  Green, yellow and red are verdicts.
+NEUTRAL: Final = "#595959"
 # width of a figure in a file [inch]
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time as a share of the axes, by whether the figure is on a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# From this ratio on, a logarithmic axis has enough marks without those between powers of ten, which cost time.
+# From this ratio on, a logarithmic axis has enough marks at powers of ten; further marks cost time.
 _DECADES: Final = 100.0
 # Number of intervals for which a curve's lowest and highest value is drawn; paper and screens show no more.
 STRETCHES: Final = 400
 # Longest name from a file in a legend [letters]; the result contains it in full.
 _LONGEST_NAME = 28
 
-# Width of a figure on a page [inch]. On a phone, where it fills the screen, its letters are about as large as those of
-# the page; on a wider page they are no larger.
+# Width of a figure on a page [inch]. On a phone it fills the screen, with letters of the size of the page.
+# On a wider page the letters are no larger than those of the page.
 PAGE_WIDTH: Final = 4.5
-# Space [inch]: above the panels for the labels of the switch times; between panels; on the right for half a number;
-# below for numbers and name of the time axis; for a line of the legend; and next to the name of the vertical axis.
+# Space [inch] above the panels for labels of switch times, between panels, and on the right for half a number,
+# below for numbers and name of the time axis, for a line of the legend, and beside the name of the vertical axis.
 _TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
 # height of the letters of an axis name [inch]
 _NAME: Final = 0.16
@@ -117,7 +119,7 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def ignore_missing_letters() -> Iterator[None]:
-    """Draw letters that the font lacks as boxes, without a warning."""
+    """Draw missing letters of the font as boxes, without a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
@@ -323,7 +325,9 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
         ignore_missing_letters(),
     ):
         canvas: Any = FigureCanvasSVG(figure)
-        canvas.print_svg(content, metadata=nothing)  # `Figure.savefig` draws it twice
+        canvas.print_svg(
+            content, metadata=nothing
+        )  # `Figure.savefig` would draw the figure twice
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(

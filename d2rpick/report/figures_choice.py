@@ -19,6 +19,7 @@ from d2rpick.report.figures import (
     BETTER,
     FLIGHT,
     GOOD,
+    NEUTRAL,
     REFERENCE,
     STRETCHES,
     SWITCHED,
@@ -58,7 +59,7 @@ if TYPE_CHECKING:
 # Heights of a figure in a file [inch]: of the energy alone, and with the motion; on a page those of each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Up to this number candidates are drawn as marks; more are drawn as a band of admissible tr.
+# Largest number of candidates drawn as marks; more are drawn as a band of admissible tr.
 _FEW: Final = 20
 # Height of the band at the bottom of the axes, clear of the curve, as a share of the axes.
 _BAND: Final = 0.045
@@ -81,7 +82,7 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # distinguishable without colour, too
+}  # line styles that are distinguishable without colour
 # height of the figure in a file, and of the axes on a page [inch]
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.
@@ -105,11 +106,11 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to this number of runs each has its own colour and name; more are grey, and only those that stand out are named.
+# Largest number of runs with colours and names; of more runs only outliers are named, and the others are grey.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# Many grey curves are together as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
+# Many grey curves together are as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
 _DARK, _FAINTEST = 10, 0.02
 # with more runs than this, lines and marks are thin
 _MANY: Final = 40
@@ -186,7 +187,7 @@ def _draw(
     panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
     for panel in panels:
         figures.format_axes(panel, legend=not page)
-    # the level belongs to the flight, even if td lies beyond it
+    # the level belongs to the flight, even if td is after its end
     scale = make_scale_of_flight(situation, view, [situation.energy_td])
     figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
@@ -226,11 +227,11 @@ def _draw_energy(
     for number, band in enumerate(
         merge_windows(bands, (view.end - view.start) / STRETCHES)
     ):
-        label = "_" if number else "acceptable tr"
-        axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
+        label = "_" if number else "admissible tr"
+        axes.axvspan(*band, ymax=_BAND, facecolor=NEUTRAL, linewidth=0, label=label)
     for acceptable, fill, name in (
-        (True, GOOD, "acceptable"),
-        (False, "none", "not acceptable"),
+        (True, NEUTRAL, "admissible"),
+        (False, "none", "not admissible"),
     ):
         marked = [
             candidate for candidate in candidates if candidate.acceptable == acceptable
@@ -243,7 +244,7 @@ def _draw_energy(
                 s=28,
                 linewidths=0.7,
                 facecolors=fill,
-                edgecolors=GOOD,
+                edgecolors=NEUTRAL,
                 zorder=3,
                 label=label,
             )
@@ -253,7 +254,7 @@ def _draw_energy(
 def _draw_better(
     panels: Sequence[Axes], better_situation: Situation, tr: float
 ) -> None:
-    """Draw a better pair as seen from its own td: level, times and motion, in its own colour and line style."""
+    """Draw a better pair for its own td: level, times and motion, in its own colour and line style."""
     lines = [panels[0].axhline(better_situation.energy_td)]
     lines += [
         panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
@@ -318,7 +319,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports, else what is to be done about it."""
+    """Return the verdict on a window supported by this run, or else its next step."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status
@@ -361,7 +362,7 @@ def draw_run(
     for flight in flights:
         mark_span(axes, flight, "flight")
     for window in windows:
-        axes.axvspan(*window, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
+        axes.axvspan(*window, ymax=_STRIP, color=NEUTRAL, linewidth=0, label="rigid")
     _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=True)
     return figure
 
@@ -415,7 +416,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     )
     td = add_unit("td", history.time_unit)
     rigid.set(
-        ylabel="saved processor time" if cost else "rigid time",
+        ylabel="saves (share of the CPU time)" if cost else "rigid time",
         xlabel=td,
         ylim=(0, None),
     )
@@ -444,7 +445,7 @@ def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) ->
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
     axes.plot(td, drawn, color=REFERENCE, linewidth=0.8, label="best pair for each td")
     axes.plot(
-        td[best], drawn[best], "o", color=GOOD, markersize=4, label="Pareto-optimal"
+        td[best], drawn[best], "o", color=NEUTRAL, markersize=4, label="Pareto-optimal"
     )
 
 
@@ -476,7 +477,9 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
             label="_",
         )
     if answer.common.window:
-        mark_span(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
+        mark_span(
+            axes, answer.common.window, "admissible in all runs", NEUTRAL, alpha=0.2
+        )
     _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
     axes.set(
@@ -494,7 +497,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
 def _choose_named_runs(
     runs: Sequence[StudyRow], curves: Mapping[int, Samples]
 ) -> list[_Named]:
-    """Return the runs with their own colour and name: all if there are few, else those that stand out."""
+    """Return the runs with their own colour and name: all if there are few, otherwise the outliers."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:
@@ -541,7 +544,7 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
     if points.size:
         is_thin = len(drawn) > _MANY
         axes.scatter(
-            points[:, 0], points[:, 1], s=8 if is_thin else 28, linewidths=0.7, facecolors=GOOD, edgecolors="white",
+            points[:, 0], points[:, 1], s=8 if is_thin else 28, linewidths=0.7, facecolors=NEUTRAL, edgecolors="white",
             zorder=3, label="tr of each run", rasterized=is_thin,
         )  # fmt: skip
 

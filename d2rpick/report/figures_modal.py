@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
-    """Mark the energy halfway between tr and td, which shows the direction of the two deformations to each other."""
+    """Mark the energy halfway between tr and td, which shows the relative direction of the two deformations."""
     middle = (tr + situation.td) / 2
     energy = situation.history.energy_at(middle)
     axes.scatter(

@@ -149,7 +149,7 @@ def _draw_outlines(
 
 
 def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
-    """Shade the rigid windows; mark the end of the sled's push and the begin of the ground contact."""
+    """Shade the rigid windows; mark the end of the sled's push and the start of the ground contact."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
         axes.axvspan(

@@ -42,7 +42,9 @@ _SARIF: Final = {
     Severity.WARNING: "warning",
     Severity.INFO: "note",
 }
-_NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
+_NOT_XML: Final = (
+    "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled at first use
+)
 
 _LINE: Final = get_kind("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
@@ -151,7 +153,7 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
 
 def as_junit(checks: Checks, _: DisplayOptions) -> str:
     """Return a suite per deck and a case per finding; findings lighter than ``fail_on`` pass but show their message."""
-    from xml.etree import ElementTree as ET  # start-up
+    from xml.etree import ElementTree as ET  # imported here to start faster
 
     suites = ET.Element("testsuites", name="d2rpick check")
 
@@ -361,7 +363,7 @@ def _count_severities(results: Sequence[Checked]) -> dict[str, int]:
 
 
 def _summarize_findings(checks: Checks) -> str:
-    """Return the number of findings and decks, and what was not judged."""
+    """Return the number of findings and decks, and which input was not judged."""
     results = checks.results
     counted = [
         f"{count} {name if count != 1 else name[:-1]}"
@@ -437,8 +439,8 @@ def _explain_matching_rules(name: str, width: int) -> Iterator[str]:
 
 
 def explain_rule(rule: Rule, width: int) -> str:
-    """Explain one rule: what it finds, why that matters, and decks that pass and fail, as wide as their cards."""
-    from textwrap import wrap  # not above: findings do without it
+    """Explain one rule: its finding, its importance, and decks that pass and fail, as wide as their cards."""
+    from textwrap import wrap  # imported here: findings do not need it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     explained = wrap(rule.explanation, width, break_on_hyphens=False)

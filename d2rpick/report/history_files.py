@@ -33,7 +33,7 @@ def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     >>> [choose_history_format(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
     ['csv', 'glstat', 'hdf5', 'csv']
     """
-    from pathlib import PurePath  # not above: start-up
+    from pathlib import PurePath  # imported here to start faster
 
     if name is None:
         return "csv"
@@ -96,7 +96,7 @@ def _make_oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes
 
 
 def _make_box_table(record: Record) -> Table:
-    """Return the columns of the box, the momentum of box and step together, and the energy balance of the model.
+    """Return the columns of the box, the total momentum of box and step, and the energy balance of the model.
 
     Internal and kinetic energy are those of the box, so that switch times of the box can be chosen from them.  Separate
     columns hold the energies of the step, the terms of contacts and walls (see `Record`) and the work done.  The total
@@ -144,7 +144,7 @@ def _make_box_matsum(record: Record) -> bytes:
     """Return a matsum of box and step; while the box is rigid, its values are those of the rigid-body motion."""
     from d2rpick.models.box_run import (
         PARTS,
-    )  # imported here since tables are written without the model
+    )  # imported here: tables do not need the model
 
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,

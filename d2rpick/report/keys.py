@@ -1,4 +1,4 @@
-"""Define the fields that several results share: of a candidate, the history, its health, and the situation at td.
+"""Define the fields shared by several results: of a candidate, the history, its health, and the situation at td.
 
 Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
@@ -148,7 +148,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# Values that explain tr but do not measure the pair; and the measures that ``verify`` shows first, in its order.
+# Values that explain tr but do not measure the pair, and the measures that ``verify`` shows first, in order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
@@ -175,7 +175,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys added after the first schemas of ``suggest`` and ``verify``, but present from the start in the others.
+# Keys added after the first schemas of ``suggest`` and ``verify``, but in the others from the start.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -326,7 +326,7 @@ FRAME: Final = (
 
 
 def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Return the oscillator that was fitted, or None if none was searched for."""
+    """Return the fitted oscillator, or None if none was searched for."""
     fit = situation.evidence.fit
     if fit is None:
         return None
@@ -341,7 +341,7 @@ def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
 
 
 def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Return the modes on which the choice rests, or None if it does not rest on modes."""
+    """Return the modes on which the choice is based, or None if it is not based on modes."""
     modal = situation.vibration.modal
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 

@@ -1,4 +1,4 @@
-"""Build HTML pages: elements from nested calls, which escape all text that is not HTML, and sections that pages share.
+"""Build HTML pages: elements from nested calls, which escape all other text, and shared sections.
 
 Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
@@ -41,7 +41,7 @@ _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# control characters that no page may contain, and those that change the direction of the text around them
+# control characters that no page may contain, and those that change the direction of the surrounding text
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
@@ -62,7 +62,7 @@ class Markup(str):
 
 
 class PageSection(Markup):
-    """A section of a page, with its title and the id to which a link in the contents leads."""
+    """A section of a page, with its title and the id that the table of contents links to."""
 
     name: str
     anchor: str
@@ -127,7 +127,7 @@ def build_document(
         make_element("title", title),
         *(make_element("style", sheet) for sheet in sheets),
     )
-    # at the top, next to the times: after a long card it could be printed on a sheet of its own
+    # at the top, next to the times: after a long card it might be printed on a separate sheet
     sign = make_element(
         "p", *(make_element("span", line) for line in signed), class_="sign"
     )
@@ -309,7 +309,7 @@ class Explorer(NamedTuple):
 
 
 class PageContext(NamedTuple):
-    """What a page shows besides the answer.
+    """Content of a page in addition to the answer.
 
     ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
     options of ``card`` that select the same history.  ``printing`` is how the card of a recommended
@@ -408,7 +408,7 @@ def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
 def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """Return the digests of a deck, its main file first, and of a file of weights; only some includes are named."""
+    """Return the digests of a deck, its main file first, and of a file of weights; long lists are cut."""
     files = list({file.name: file for file in deck}.values())
     hidden_count = len(files) - _MOST_FILES
     if hidden_count > 0:
@@ -485,16 +485,39 @@ def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
     )
 
 
-def build_solver_input(times: tuple[float, float], record: PageContext) -> Markup:
-    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
+def build_solver_input(
+    decision: Decision, times: tuple[float, float], record: PageContext
+) -> Markup:
+    """Return the D2R card of a pair, or the command that prints it; folded below the verdict "do not use"."""
     title = "Solver input"
+    contents = _list_solver_input(times, record)
+    if decision.verdict != DO_NOT_USE:
+        return build_section(title, *contents)
+    badge = make_element("span", decision.verdict, class_="badge refused")
+    return build_section(
+        title,
+        make_element("p", badge),
+        make_element("p", f"{decision.reason}. To improve: {decision.cure}."),
+        make_element(
+            "details",
+            make_element("summary", "Show the card that must not be used"),
+            *contents,
+            class_="unused",
+        ),
+    )
+
+
+def _list_solver_input(
+    times: tuple[float, float], record: PageContext
+) -> tuple[Markup, ...]:
+    """Return the D2R card if the parts to be switched are known, otherwise the command that prints it."""
     printing = record.printing
     assert printing is not None
     if record.refusal:
         reason = f"No card can be printed for these times: {record.refusal}"
-        return build_section(title, make_element("p", reason))
+        return (make_element("p", reason),)
     if record.card:
-        return build_section(title, make_element("pre", record.card.text, tabindex="0"))
+        return (make_element("pre", record.card.text, tabindex="0"),)
     solver = printing.solver or DEFAULT
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
@@ -505,9 +528,7 @@ def build_solver_input(times: tuple[float, float], record: PageContext) -> Marku
         ),
         class_="wrap",
     )
-    return build_section(
-        title, make_element("p", "Printed, and judged again as printed, by"), line
-    )
+    return (make_element("p", "Printed, and judged again as printed, by"), line)
 
 
 def _build_input(situation: Situation, run: OpenedRun) -> Markup:

@@ -1,4 +1,4 @@
-"""Write answers as HTML: pages to be read, printed and signed, and what a notebook shows of a run or an answer."""
+"""Write answers as HTML: pages to be read, printed and signed, and displays in notebooks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# Most rows of a table on a page: the eye cannot compare more, and CSV and JSON hold all.
+# Most rows of a table on a page: more cannot be compared by eye, and CSV and JSON have all.
 _MOST_ROWS = 20
 
 # Most rows of a table in a notebook.
@@ -125,9 +125,9 @@ def _build_lower_sections(
     yield build_section("Candidates", *_build_candidates(answer))
     yield page.build_mismatch_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
-    if answer.recommended:
+    if answer.recommended and answer.decision:
         yield page.build_solver_input(
-            (answer.recommended.tr, answer.recommended.td), record
+            answer.decision, (answer.recommended.tr, answer.recommended.td), record
         )
 
 
@@ -215,7 +215,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         )
     yield from page.build_evidence(situation, answer.health, record)
     if record.printing:
-        yield page.build_solver_input(times, record)
+        yield page.build_solver_input(answer.decision, times, record)
 
 
 def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:
@@ -380,7 +380,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
-    """Return the outcome without what the card of the common tr has already."""
+    """Return the outcome without the contents of the card of the common tr."""
     outcome = study.list_outcome(answer)
     return outcome if answer.common.tr is None else outcome[1:]
 
@@ -484,7 +484,7 @@ def _build_set_card(best: PartSet | None) -> Markup:
         "span",
         make_element("i", "saves about"),
         f"{best.saving:.0%}",
-        make_element("i", " of the processor time"),
+        make_element("i", " of the CPU time"),
     )
     listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
     return make_element(
@@ -519,7 +519,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         )
     ]
     cards = cards or [make_element("p", "No flight was switched.")]
-    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
+    caption = "Internal energy while the parts are deformable, with the rigid windows; while rigid it means nothing"
     flights = [(window.free, window.contact or window.td) for window in switched]
     rigid = [(window.tr, window.td) for window in switched]
     return build_document(
@@ -545,7 +545,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
     )
 
 
-# For each kind of answer: sentences, the shortest first, and the head and rows of its table.
+# For each kind of answer: sentences, the shortest first, and the header and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {

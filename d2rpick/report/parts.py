@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Columns of the sets, and of the parts in two tables: as many as fit side by side on a screen or a sheet.
+# Columns of the sets, and of the parts in two tables: as many as fit next to each other on a screen or sheet.
 SETS = (
     "set",
     "parts",
-    "saves of a step",
+    "saved per step",
     "tr",
     "td",
-    "processor time",
+    "CPU time",
     "saves",
     "out of place",
-    "turned [deg]",
+    "rotated [deg]",
 )
 TABLES = {
     "Parts": (
@@ -89,7 +89,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# a part's behaviour in flight is that in the longest flight
+# the behaviour of a part in flight is that in the longest flight
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -152,7 +152,7 @@ _FLIGHT: Final = row(
 )
 _MOST_SHOWN = 6
 # Columns that are left out, in this order, if a terminal is too narrow.
-_SPARE: Final = ("material", "step", "mass", "saves of a step", "turned [deg]")
+_SPARE: Final = ("material", "step", "mass", "saved per step", "rotated [deg]")
 # Verdicts on parts, for people.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
 # Names of the sets, for people.
@@ -267,12 +267,12 @@ def as_csv(answer: Parts, _: DisplayOptions) -> str:
 
 
 def as_value(answer: Parts, _: DisplayOptions) -> str:
-    """Return the part ids of the recommended set as ``--part`` takes them, nothing if none is recommended."""
+    """Return the part ids of the recommended set in the form of ``--part``, nothing if none is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
 def list_heading(answer: Parts) -> list[tuple[str, str]]:
-    """Return what was read, as pairs of a name and a description."""
+    """Return the input, as pairs of a name and a description."""
     run = answer.files
     deck = answer.inventory
     formats = " + ".join(database.format for database in run.databases)
@@ -397,7 +397,9 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
         else:
             much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
-        cures = "set a maximum with --step-cap; --step-ratio adds its gain to the processor time saved"
+        cures = (
+            "set a maximum with --step-cap; --step-ratio adds its gain to the saving"
+        )
         lines.append(("time step", f"{grows}: {cures}"))
     lines += [
         (name_set(part_set), reason)
@@ -425,7 +427,7 @@ def _format_sharing_parts(row: PartRow) -> str | None:
 
 
 def format_part_ranges(ids: Sequence[int]) -> str:
-    """Return part ids as ``--part`` takes them.
+    """Return part ids in the form of ``--part``.
 
     Examples
     --------
@@ -465,7 +467,7 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "parts": lambda part_set: format_part_ranges(part_set.parts),
     "elements": lambda part_set: part_set.elements,
     "mass": lambda part_set: _format_percent(part_set.mass_fraction),
-    "saves of a step": lambda part_set: _format_percent(part_set.cost_share),
+    "saved per step": lambda part_set: _format_percent(part_set.cost_share),
     "step grows": lambda part_set: (
         "free"
         if is_limited_by_no_part(part_set)
@@ -473,10 +475,10 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     ),
     "tr": lambda part_set: part_set.window[0] if part_set.window else None,
     "td": lambda part_set: part_set.window[1] if part_set.window else None,
-    "processor time": lambda part_set: _format_percent(part_set.run_time_share),
+    "CPU time": lambda part_set: _format_percent(part_set.run_time_share),
     "saves": lambda part_set: _format_percent(part_set.saving),
     "out of place": _format_position_error,
-    "turned [deg]": lambda part_set: _format_lower_bound(
+    "rotated [deg]": lambda part_set: _format_lower_bound(
         part_set, part_set.angle_error
     ),
 }

@@ -45,7 +45,8 @@ _POSITION: Final = (
     "position_error_assumes",
 )
 # Columns that are left out first if the table would be too wide.
-_SPARE: Final = ("margin", "processor time", "out of place", "error")
+_OUT_OF_PLACE: Final = "out of place"
+_SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "error")
 
 
 def _get_time(row: PlannedFlight, at: int) -> float | None:
@@ -191,12 +192,14 @@ DOCUMENT: Final = Document(
 
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the plan in a sentence, the next command, a row per flight, and why windows are not better or planned."""
+    """Return the plan in a sentence, the next command, a row per flight, and reasons with improvements."""
     if plan.flights:
         rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
     else:
         rows = "no flight"
     below = [*list_verdicts(plan), *list_plan_remarks(plan), *list_reasons(plan)]
+    if _OUT_OF_PLACE not in rows.partition("\n")[0]:
+        below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
     steps = tables.format_in_line(list_next_steps(plan), 4)
@@ -214,7 +217,7 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def give_plan_sentence(plan: RunPlan) -> str:
-    """Return what to do, in one sentence."""
+    """Return the recommended action in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
     if not supported:
@@ -266,13 +269,13 @@ def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = "print the cards with -f card, and run the deck with them from the start"
     if plan.done:
-        cards += "; they hold the windows that are done too"
+        cards += "; they contain the windows that are done too"
     again = "; then plan the others from that run (--done)" if waiting else ""
     return [("next", f"{cards}{again}")]
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return why the planned windows are not better and what would improve them, each with the name of its flight."""
+    """Return why the planned windows are not better and how to improve them, each with the name of its flight."""
     return [
         (f"flight {row.number}", format_in_full(row.decision))
         for row in plan.flights
@@ -320,7 +323,7 @@ def as_value(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return which rigid time was given up for quality, and the position errors, as pairs of a name and a sentence."""
+    """Return the rigid time given up for quality, and the position errors, as pairs of a name and a sentence."""
     supported = plan.supported
     lines = []
     pairs = [(row.number, row.answer) for row in supported if row.answer]
@@ -335,7 +338,7 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
         if row.candidate and row.candidate.position_error_assumes
     ]
     if assumed:
-        deck_hint = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        deck_hint = "; `deck` shows which do" if plan.settings.bodies is None else ""
         listed = ", ".join(
             f"flight {row.number} by {_format_place_error(row)}" for row in assumed
         )
@@ -348,6 +351,17 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
     return lines
 
 
+def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
+    """Return the position errors that the remarks do not name, for a table without a column for them."""
+    return [
+        (f"flight {row.number}", f"out of place at td by {_format_place_error(row)}")
+        for row in plan.flights
+        if row.candidate
+        and row.candidate.position_error is not None
+        and not row.candidate.position_error_assumes
+    ]
+
+
 def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of all flights; CPU time and position error only if they are known."""
     placed = any(
@@ -355,8 +369,8 @@ def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]
         for row in plan.flights
     )
     unknown = [
-        *["processor time"] * (plan.settings.cost_share is None),
-        *["out of place"] * (not placed),
+        *["CPU time"] * (plan.settings.cost_share is None),
+        *[_OUT_OF_PLACE] * (not placed),
     ]
     return tables.fill_table(
         {name: cell for name, cell in _COLUMNS.items() if name not in unknown},
@@ -396,11 +410,11 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "tr": lambda row: _get_time(row, 0),
     "td": lambda row: _get_time(row, 1),
     "rigid for": lambda row: row.rigid_time,
-    "processor time": lambda row: tables.format_if_known(
+    "CPU time": lambda row: tables.format_if_known(
         row.candidate.run_time_share if row.candidate else None, ".0%"
     ),
     "error": format_pair_error,
-    "out of place": _format_place_error,
+    _OUT_OF_PLACE: _format_place_error,
     "verdict": lambda row: row.decision.verdict if row.decision else None,
     "when": lambda row: _WHEN[row.status],
 }

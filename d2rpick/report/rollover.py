@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.report.formats import DisplayOptions
 
-# fields of each run, in JSON and as columns
+# fields of a run in JSON, and columns of the table
 RUN: Final = row(
     *(
         Field(key, "number")
@@ -80,7 +80,7 @@ class Scan(NamedTuple):
 
 
 def as_table(scan: Scan, display: DisplayOptions) -> str:
-    """Return what happened in the reference run, a row for each tr, and the error of the tr that d2rpick recommends."""
+    """Return the events of the reference run, a row for each tr, and the error of the recommended tr."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
     recommended = _get_recommended_tr(answer)

@@ -1,4 +1,4 @@
-"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
+"""Describe the common parts of suggest and verify: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def name_energy(history: History) -> str:
 def list_situation_heading(
     situation: Situation, *, verbose: bool = False
 ) -> list[tuple[str, str]]:
-    """Return the history and what the choice rests on, as pairs of a name and a text; ``verbose`` adds the reasons."""
+    """Return history and basis of the choice, as pairs of a name and a text; ``verbose`` adds reasons."""
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
-    kinetic = "" if share is None else f", kinetic share {format_measure(share)}"
+    kinetic = "" if share is None else f", kinetic fraction {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", describe_input(situation.history)),
@@ -78,7 +78,7 @@ def name_evidence(source: str | None) -> str:
 
 
 def _describe_basis(situation: Situation) -> str:
-    """Return what the choice rests on, and the fitted oscillator."""
+    """Return the basis of the choice, and the fitted oscillator."""
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
@@ -99,20 +99,22 @@ def _describe_basis(situation: Situation) -> str:
     )
     source = "given" if situation.settings.oscillator else "identified"
     front = f"{summary}; " if summary else ""
-    return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
+    return (
+        f"{front}oscillator, {source}: {', '.join(facts)}; it refines tr and energies"
+    )
 
 
 def _explain_level_alone(situation: Situation) -> str:
-    """Return a note that no deformation is known, with the reason if it is that several modes vibrate."""
+    """Return a note that no deformation is known, with the reason if several modes vibrate."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
     several = "several modes; " if fit and fit.mode and not fit.describes_record else ""
-    return f"energy level alone ({several}the sign is unknown)"
+    return f"energy alone ({several}the direction of the deformation is unknown)"
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
-    """Return the column names of a table of health; the first says up to which time the run was judged."""
+    """Return the column names of a table of health; the first gives the time up to which it was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -156,7 +158,7 @@ def list_health_measures(health: Health) -> list[Measure]:
             limits.MOST_NEGATIVE_SLIDING,
         ),
         _make_share_measure(
-            "energy of deleted elements", health.eroded_share, MOST_WORK
+            "energy of eroded elements", health.eroded_share, MOST_WORK
         ),
     ]
     if health.window:
@@ -169,7 +171,7 @@ def list_health_measures(health: Health) -> list[Measure]:
             _make_share_measure(
                 "work beyond gravity and damping there", health.window_work, MOST_WORK
             ),
-            _make_share_measure("energy deleted there", health.window_eroded, 0.0),
+            _make_share_measure("energy eroded there", health.window_eroded, 0.0),
         ]
     return measures
 

@@ -71,7 +71,7 @@ _ERROR: Final = Field(
     "ndjson see common_errors in the last line",
     lambda run_and_error: run_and_error[1],
 )  # fmt: skip
-# A run in JSON, and a row of the CSV, from a pair of a run and its error at the common tr.
+# Fields of a run and of its error at the common tr, in JSON and in a row of the CSV.
 RUN: Final = row(
     *PLAIN.of_part(lambda run_and_error: run_and_error[0]), _ERROR, **_JUDGED
 )
@@ -114,11 +114,11 @@ _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
     Field("acceptable", many(many("span")),
-          "Windows of acceptable tr, and those in which the error is at most 0.05 above that of tr."),
+          "Intervals of admissible tr, and those in which the error is at most 0.05 above that of tr."),
     Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
     Field("asked", "text", "Stands for the options and the version."),
     Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
-    Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
+    Field("profile", maybe(_CURVE), "Times and errors of admissible tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
@@ -134,7 +134,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return what the runs have in common, and one line per run with its shortened name."""
+    """Return the common results of the runs, and one line per run with its shortened name."""
     head, rows = tables.select_known_columns(*build_run_table(answer))
     rows = [
         [name, *row[1:]]
@@ -151,7 +151,7 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
 
 
 def as_markdown(answer: StudyOfRuns, _: DisplayOptions) -> str:
-    """Return what the runs have in common, and the runs as a Markdown table."""
+    """Return the common results of the runs, and the runs as a Markdown table."""
     outcome_lines = tables.format_as_list(
         [*list_outcome(answer), *list_run_reasons(answer)]
     )
@@ -165,7 +165,7 @@ def as_csv(answer: StudyOfRuns, _: DisplayOptions) -> str:
 
 
 def as_ndjson(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return the lines of the runs that are not written yet, and what the runs have in common."""
+    """Return the lines of the runs that are not written yet, and the common results of the runs."""
     return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
@@ -211,7 +211,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return what the runs have in common, as pairs of a name and a text."""
+    """Return the common results of the runs, as pairs of a name and a text."""
     spread = answer.spread
     common = answer.common
     own_tr = "none"
@@ -239,7 +239,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest of some errors, or one number if they are displayed the same."""
+    """Return the smallest and largest error, or one number if they are displayed the same."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
@@ -264,7 +264,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return, without duplicates, why the runs' pairs are not better, and what would improve them."""
+    """Return, without duplicates, why the runs' pairs are not better, and how to improve them."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -289,7 +289,7 @@ def describe_td(answer: StudyOfRuns) -> str:
 
 
 def shorten_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Return the distinctive part of each name, without folders and file names that all have in common.
+    """Return the distinctive part of each name, without the folders and file names common to all.
 
     Examples
     --------

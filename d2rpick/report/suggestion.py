@@ -49,7 +49,7 @@ CANDIDATE: Final = row(
 
 # Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
-_IN_FULL: Final = ("rank", "kind", "+-", "lock-in error")
+_IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 
 
 def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
@@ -144,7 +144,7 @@ def _select_shown_candidates(
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return CSV with all candidates, a column for each key of the JSON output but ``parts``, and the td."""
+    """Return CSV of all candidates, with one column for td and one for each JSON key except ``parts``."""
     left_out = ("notes", "parts")
     columns = [*(key for key in CANDIDATE.keys if key not in left_out), "td", "notes"]
     td = answer.situation.td
@@ -185,7 +185,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     if saves := format_saving(best):
         lines.append(("saves", saves))
     if answer.situation.vibration.keeps_nothing:
-        lines.append(("keeps", "no switch keeps this vibration"))
+        lines.append(("keeps", "nothing of the vibration: no tr can keep it"))
     if exact := format_accuracy(best):
         lines.append(("tr", exact))
     return lines
@@ -205,10 +205,10 @@ def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
-    """Return in which respect the better pair is better."""
+    """Return the respects in which the better pair is better."""
     recommended = answer.recommended
     if recommended is None:
-        return "there an acceptable tr exists"
+        return "it has an admissible tr"
     if better.residual is not None and recommended.residual is not None:
         residuals = [
             tables.format_measure(pair.residual) for pair in (better, recommended)
@@ -216,14 +216,14 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
         return f"residual {residuals[0]} instead of {residuals[1]}"
     level = answer.situation.vibration.whole.energy(better.td)
     own_level = answer.situation.energy_td
-    return f"the energy there is {level / own_level:.3g} times as high, so that more of the vibration can be kept"
+    return f"the energy at td is {level / own_level:.3g} times as high, so more of the vibration can be kept"
 
 
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
     """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
     chosen = answer.recommended.tr if answer.recommended else None
     if answer.windows:
-        lines = [("acceptable", describe_acceptable_windows(answer.windows, chosen))]
+        lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
     else:
         lines = []
     best = answer.chosen
@@ -247,25 +247,28 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
     """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
-    taken += " (`deck` tells which do)" if taken and not deck else ""
+    taken += " (`deck` shows which do)" if taken and not deck else ""
     if best.position_error_part is None:
-        return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
+        return f"in place at td{taken}, as far as the parts show: none moves relative to the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
     bound_text = "at least " if best.position_error_is_lower_bound else ""
     size = f"{bound_text}{best.position_error:.2g}"
-    return f"off by {size} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    return f"out of place by {size} at td{body}{taken}: {best.position_error_part} is frozen at another place"
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Return how much rigid time was given up for a better level or residual, and how much better it is."""
+    """Return the rigid time given up for a better level or residual, and the improvement."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:
         better_quality = f"residual {tables.format_measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
+    return (
+        f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for a "
+        "smaller error"
+    )
 
 
 def describe_acceptable_windows(
@@ -323,7 +326,7 @@ def build_candidate_table(
         "direction": lambda c: {True: "same", False: "opposite", None: None}[
             c.sign_match
         ],
-        "lock-in error": lambda c: tables.format_measure(c.lock_in_error),
+        "frozen-deformation error": lambda c: tables.format_measure(c.lock_in_error),
         "residual": lambda c: tables.format_measure(c.residual),
         "timing tolerance": lambda c: tables.format_if_known(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,

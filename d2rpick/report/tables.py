@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# Width of a column above which long words, such as paths or lists of parts, are split if a table is too wide; if that
-# is not enough, words longer than the least width are split too. No number is as long.
+# Width of a column above which long words, such as paths or lists of parts, are split in a table that is too wide.
+# If that is not enough, words longer than the least width are split too; no number is as long.
 _WORD: Final = 32
 _LEAST: Final = 12
-# A formula begins with one of these signs, which spreadsheets of some languages also accept in full width: at the start
-# of a cell, or after a semicolon, which separates cells in languages with a decimal comma. A number is no formula.
+# A formula begins with one of these signs, which spreadsheets of some languages also accept in full width.
+# It begins at the start of a cell, or after a semicolon, the cell separator in languages with a decimal comma.
+# A number is not a formula.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
 # A longer cell is text, which is wrapped before a column is left out [letters].
@@ -110,7 +111,7 @@ def remove_star_column(
 def format_in_line(
     named_texts: Iterable[tuple[str, Cell]], width: int = 0
 ) -> list[str]:
-    """Return aligned lines of a name and its text; names take ``width`` letters, by default as many as the longest."""
+    """Return aligned lines of a name and its text; names have ``width`` letters, by default those of the longest."""
     lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
@@ -361,14 +362,14 @@ def as_json(result: Any, indent: int | None = 2) -> str:
 
 
 def quote_shell_line(words: Iterable[str]) -> str:
-    r"""Quote words so that bash, zsh and POSIX shells of 2024 restore them, in printable characters only.
+    r"""Quote words so that bash, zsh and POSIX shells of 2024 restore them, with printable characters only.
 
     Examples
     --------
     >>> print(quote_shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
-    import shlex  # imported here to keep the start fast
+    import shlex  # imported here to start faster
 
     return " ".join(
         shlex.quote(word)

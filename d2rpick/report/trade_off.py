@@ -47,7 +47,7 @@ COLUMNS: Final = [
 
 # smallest change of the rigid time, as a share of it, that is mentioned
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share within these limits is halved; if it falls further, its new value is what counts.
+# An error that falls to a share within these limits is halved; if it falls further, its new value is given.
 _HALF: Final = (0.45, 0.5)
 
 
@@ -60,11 +60,11 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+_NOT_HALVED: Final = "halves the error and keeps half of the rigid time"
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the answer in a sentence, the verdict on the best pair, some Pareto-optimal offers, and the input."""
+    """Return the answer in a sentence, the verdict on the best pair, Pareto-optimal offers, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -93,11 +93,11 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with the recommended pair, why, and how to improve it, as pairs of a name and a text."""
     best = trade_off.recommended
     decision = best.decision_with_cure if best else None
     if best is None or best.best is None or decision is None:
-        return [("no pair to use", "no td in the window has an acceptable tr")]
+        return [("no pair to use", _explain_why_no_pair(trade_off))]
     return list_verdict_lines(decision, best.best.tr, best.td)
 
 
@@ -119,7 +119,7 @@ def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
 
 
 def give_answer(trade_off: TradeOff) -> str:
-    """Return in one sentence how good the requested td is, and what a change to another td gains or costs.
+    """Return in one sentence how good the requested td is, and the gain or cost of another td.
 
     Without a requested td, the comparison starts from the td that saves most.
     """
@@ -127,12 +127,12 @@ def give_answer(trade_off: TradeOff) -> str:
     step = trade_off.step
     unit = trade_off.situation.history.time_unit
     if start is None:
-        return "no td in the window has an acceptable tr"
-    start_text = f"td = {start.td:.6g}" + (
-        "" if trade_off.requested else " saves the most"
-    )
+        return "no td in the range has an admissible tr"
+    start_text = f"td = {start.td:.6g}"
+    if not trade_off.requested:
+        start_text += f" {_describe_longest(start)}"
     if start.best is None:
-        quality_text = f"{start_text} has no acceptable tr"
+        quality_text = f"{start_text} has no admissible tr"
         return (
             quality_text
             if step is None
@@ -144,7 +144,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"{start_text}: {_format_offer_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{quality_text}; no other td in the window {'is better' if small else _NOT_HALVED}"
+        return f"{quality_text}; no other td in the range {'is better' if small else _NOT_HALVED}"
     distance = _describe_distance(start, step, unit)
     error_change = _describe_error_change(start, step)
     cost_change = _describe_cost_change(start, step)
@@ -171,8 +171,21 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 ))  # fmt: skip
 
 
+def _explain_why_no_pair(trade_off: TradeOff) -> str:
+    """Explain why no td has a pair by the td of the highest energy, of which most could be kept."""
+    if not trade_off.offers:
+        return "no td in the range has an admissible tr"
+    highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
+    return f"no td in the range has an admissible tr; td = {highest.td:.6g}: {highest.answer.why_none}"
+
+
+def _describe_longest(start: Offer) -> str:
+    """Return in which respect the td from which the comparison starts exceeds the others."""
+    return "is rigid for longest" if start.saving is None else "saves the most CPU time"
+
+
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
-    """Return how far the other td is away, and its value."""
+    """Return the distance of the other td, and its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
@@ -182,7 +195,7 @@ def _describe_error_change(start: Offer, step: Offer) -> str:
     """Return how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
-        return "brings the level below twice the mean energy"
+        return "brings the energy at td below twice its mean"
     assert step.error is not None
     halves = _HALF[0] * start.error <= step.error <= _HALF[1] * start.error
     return f"{'halves the error' if halves else 'cuts the error'} to {step.error:.3f}"
@@ -193,8 +206,8 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
-            return "costs no processor time"
-        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's processor time"
+            return "costs no CPU time"
+        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's CPU time"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1
@@ -208,7 +221,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 def _format_offer_error(offer: Offer) -> str:
     """Return the error of an offer with its name."""
     if offer.error is None:
-        return "a level above twice the mean energy"
+        return "an energy above twice its mean"
     if offer.basis == "energy":
         return (
             f"error {tables.format_measure(offer.error)} (shortfall of the level at td)"
@@ -217,7 +230,7 @@ def _format_offer_error(offer: Offer) -> str:
 
 
 def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
-    """Return the offers that the answer names, and Pareto-optimal ones at even distances, up to ``limit`` in all."""
+    """Return the offers named by the answer, and evenly spaced Pareto-optimal ones, up to ``limit`` in all."""
     named_td = {
         offer.td
         for offer in (
@@ -243,7 +256,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 def build_offer_table(
     offers: Sequence[Offer],
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of some offers; the recommended offer has a star."""
+    """Return the column names and cells of the offers; the recommended offer has a star."""
     return tables.fill_table(_COLUMNS, offers)
 
 
@@ -266,7 +279,7 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "kinetic fraction": lambda offer: tables.format_measure(offer.kinetic_share),
     "rigid for": lambda offer: offer.rigid_time,
     "of simulated time": _make_getter_of_best("rigid_fraction", ".1%"),
-    "processor time": _make_getter_of_best("run_time_share", ".0%"),
+    "CPU time": _make_getter_of_best("run_time_share", ".0%"),
     "timing tolerance": _make_getter_of_best("timing_tolerance", ".1e"),
     "verdict": lambda offer: (
         format_in_short(offer.decision) if offer.decision else offer.answer.why_none

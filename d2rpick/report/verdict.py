@@ -68,7 +68,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return the verdict, why, and what would be better; then its evidence, and the measures of the pair."""
+    """Return the verdict, the reasons and improvements, its evidence, and the measures of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
@@ -89,7 +89,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
-    """Return what to do with the pair, why, and what would be better, as pairs of a name and a sentence."""
+    """Return what to do with the pair, why, and how to improve it, as pairs of a name and a sentence."""
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
 
 
@@ -115,7 +115,7 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
         ("kinetic fraction at td", tables.format_if_known(answer.kinetic_share, ".3f")),
-        ("lock-in error", tables.format_if_known(best.lock_in_error, ".3f")),
+        ("frozen-deformation error", tables.format_if_known(best.lock_in_error, ".3f")),
         ("residual, expected", tables.format_if_known(best.residual, ".3f")),
         ("residual, lowest", tables.format_if_known(best.residual_low, ".3f")),
         ("residual, highest", tables.format_if_known(best.residual_high, ".3f")),

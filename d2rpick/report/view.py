@@ -1,4 +1,4 @@
-"""Select what a figure shows of a choice: the flight around td, the range of its energy, and the motion after td."""
+"""Select the content of a figure about a choice: the flight around td, its energy range, and the motion after td."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown beyond each end of the flight, as a share of it: enough to see the load and the landing begin.
+# Time shown beyond each end of the flight, as a share of it: the load and the start of the landing are visible.
 _BEYOND = 0.06
-# If the highest energy is more than this ratio above the level, the axis is logarithmic, since the level would vanish
-# on a linear one; a logarithmic axis ends at the level divided by this ratio.
+# Ratio of the highest energy to the level above which the axis is logarithmic, since the level would vanish.
+# A logarithmic axis ends at the level divided by this ratio.
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
 # space above and below the curve, as a share of its height
@@ -73,7 +73,7 @@ def merge_windows(
 
 
 def make_scale(low: float, high: float, level: float) -> Scale:
-    """Return the scale for values from ``low`` to ``high`` on which ``level`` is easy to see [energy].
+    """Return the scale for values from ``low`` to ``high`` on which ``level`` is clearly visible [energy].
 
     Examples
     --------
@@ -91,7 +91,7 @@ def make_scale(low: float, high: float, level: float) -> Scale:
 def make_scale_of_flight(
     situation: Situation, view: View, levels: Sequence[float]
 ) -> Scale:
-    """Return the scale for a flight and its levels; if nothing vibrates, for the energy of the whole run [energy]."""
+    """Return the scale for a flight and its levels; without a vibration, for the energy of the whole run."""
     if situation.at_rest:
         return make_scale(
             0.0,

@@ -42,15 +42,15 @@ _ALL = (
     if isinstance(value, Rule)
 )
 _BY_HISTORY: Final = "D2R2"  # beginning of the ids of rules that need an energy history
-# Least similarity of a suggested rule id to a wrong one, from 0 to 1: they differ by one additional character.
+# Smallest similarity of a suggested rule id to a wrong one, from 0 to 1: one additional character.
 _ALIKE: Final = 0.9
-# Rules that report consequences of a mistake of units, by the rule that reports the mistake itself.
+# Rules that report consequences of a wrong unit, by the rule that reports the wrong unit itself.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# A time after the end of the run lies outside its history, too; by what follows, on the same line.
+# A time after the end of the run is outside its history, too: consequences on the same line.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
@@ -127,8 +127,8 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
     near = near or difflib.get_close_matches(wanted, rule_ids, n=1, cutoff=_ALIKE)
     text = "an id like D2R101 or its beginning was expected"
     if near:
-        text += f"; did you mean {near[0]}?"
-    return text
+        return f"{text}; did you mean {near[0]}?"
+    return f"{text}; d2rpick rule lists all"
 
 
 def _count_differences(first: str, second: str) -> int:
@@ -287,7 +287,7 @@ def check_deck(
     configuration.verify(RULES)
     case = _read_case(path, content, judge, restarts)
     findings = _remove_consequences(list(_apply_rules(case, configuration)))
-    order = {path: 0}  # the deck itself first, its includes as they come
+    order = {path: 0}  # the deck itself first, then its includes in their order
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(
@@ -312,7 +312,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Return the findings without those that follow from a mistake of units, or of one time, reported by another."""
+    """Return the findings without those that follow from a wrong unit, or wrong time, reported by another rule."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {
@@ -342,7 +342,7 @@ def _strip_windows(windows: Iterable[SwitchWindow]) -> Iterator[CheckedWindow]:
 def _select_rules(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
-    """Return the selected rules for a solver; memoised, as there may be thousands of decks."""
+    """Return the selected rules for a solver; cached, as there may be thousands of decks."""
     configuration = Configuration(select, ignore)
     wanted = (
         rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)
@@ -381,13 +381,13 @@ def _read_case(
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
-        from d2rpick.deck.radioss_run import read_run  # not above: start-up
+        from d2rpick.deck.radioss_run import read_run  # imported here to start faster
 
         run = read_run(path, content)
         return RunCase(run.deck, judge, run=run)
     deck = read_deck(path, source)
     if restarts:
-        from d2rpick.deck.restarts import join_restarts  # not above: start-up
+        from d2rpick.deck.restarts import join_restarts  # imported here to start faster
 
         deck = join_restarts(deck, restarts)
     return Case(deck, judge)

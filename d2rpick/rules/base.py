@@ -99,7 +99,7 @@ class Unreadable(NamedTuple):
 
     @property
     def code(self) -> str:
-        """Return the code of the warning that reports it."""
+        """Return the code of the warning that reports this deck."""
         return "unreadable-deck" if isinstance(self.error, FORESEEN) else INTERNAL_ERROR
 
     @property
@@ -166,7 +166,9 @@ class Case:
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
             return ()
-        from d2rpick.rules.by_force import follow_forced_switches  # not above: start-up
+        from d2rpick.rules.by_force import (
+            follow_forced_switches,
+        )  # imported here to start faster
 
         end = min(self.judge.end, self.end or self.judge.end)
         return tuple(
@@ -180,7 +182,7 @@ class Case:
         """Return the switches by a force and by a sensor, with their windows."""
         if not self.sensed:
             return self.forced
-        from d2rpick.rules.by_force import Forced  # not above: start-up
+        from d2rpick.rules.by_force import Forced  # imported here to start faster
 
         switches = [*self.forced]
         for sensed_set in self.sensed:
@@ -200,7 +202,7 @@ class Case:
         if not any(header.code.value == BY_SENSOR for _, header in self.headers):
             return ()
         from d2rpick.rules.by_sensor import (
-            follow_sensed_switches,  # not above: start-up
+            follow_sensed_switches,  # imported here to start faster
         )
 
         ends = (self.end, self.judge.end if self.judge else None)
@@ -209,7 +211,7 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """Return the nodal rigid bodies, extra nodes and joints, which may lie in a switched part."""
+        """Return the nodal rigid bodies, extra nodes and joints, which may belong to a switched part."""
         return [
             *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
         ]
@@ -225,7 +227,7 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Return True if all parts are known; a file that contains only switching cards belongs to another deck."""
+        """Return True if all parts are known; a file with only switching cards belongs to another deck."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property
@@ -251,7 +253,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # empty for Radioss
+        ]  # empty for Radioss decks
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -261,7 +263,7 @@ class Case:
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the cards that no time switches, each with what switches it."""
+        """Return the cards that do not switch by time, each with its trigger."""
         return ()
 
     @cached_property
@@ -282,7 +284,7 @@ class Case:
         """Return the parts that must not be switched, with the reason, by part id."""
         from d2rpick.deck.unswitchable import (
             find_unswitchable_in_ls_dyna,
-        )  # not above: start-up
+        )  # imported here to start faster
 
         return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
@@ -295,7 +297,7 @@ class Case:
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
         ]
-        # ENDTIM and DT have the same place.
+        # ENDTIM and DT have the same columns.
         return tuple((card, card.real(card.rows[0], DATABASE["DT"])) for card in cards)
 
 
@@ -313,7 +315,9 @@ class RunCase(Case):
     @cached_property
     def found(self) -> RunWindows:
         """Return the windows, and the parts of the rigid bodies."""
-        from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
+        from d2rpick.deck.radioss_run import (
+            find_run_windows,
+        )  # imported here to start faster
 
         if self.judge is None:
             return find_run_windows(self.run)
@@ -323,7 +327,9 @@ class RunCase(Case):
 
     def _find_course(self, body: Body) -> Course:
         """Return the course of the run for the sensor of a body."""
-        from d2rpick.deck.radioss_run import find_course  # not above: start-up
+        from d2rpick.deck.radioss_run import (
+            find_course,
+        )  # imported here to start faster
 
         parts = self.found.parts.get(body.node.value, ())
         if self.judge is None:
@@ -355,7 +361,7 @@ class RunCase(Case):
         """Return the bodies that a force sensor switches, with the course in the history."""
         from d2rpick.deck.radioss_sensors import (
             find_contacts_of_sensor,
-        )  # not above: start-up
+        )  # imported here to start faster
         from d2rpick.rules.by_force import Forced
 
         starter = self.run.starter
@@ -394,7 +400,7 @@ class RunCase(Case):
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
         """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
         from d2rpick.deck.radioss_sensors import (
-            find_active_spans,  # not above: start-up
+            find_active_spans,  # imported here to start faster
         )
 
         starter = self.run.starter
@@ -428,7 +434,7 @@ class RunCase(Case):
         """Return the parts that must not be switched, with the reason, by part id."""
         from d2rpick.deck.unswitchable import (
             find_unswitchable_in_radioss,
-        )  # not above: start-up
+        )  # imported here to start faster
 
         if self.run.starter:
             return find_unswitchable_in_radioss(self.run.starter)
@@ -436,10 +442,12 @@ class RunCase(Case):
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """Return what the starter does wrongly to the nodes of the bodies that the legs switch."""
+        """Return the harmful effects of the starter on the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
-        from d2rpick.deck.radioss_flaws import find_flaws  # loads numpy
+        from d2rpick.deck.radioss_flaws import (
+            find_flaws,
+        )  # imported here: it loads numpy
 
         return find_flaws(self.run, self.run.named)
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # of time
+    Spans = tuple[tuple[float, float], ...]  # spans of time
 
-# By CODE, what has the force, and True if the set waits for a force, False if it waits until there is none.
+# By CODE: the owner of the force, and True if the set waits for a force, False if it waits for its end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,7 +34,7 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-_NEVER: Final = 1e20  # TIME2 from which on there is no latest time
+_NEVER: Final = 1e20  # no latest time if TIME2 is at least this
 # Windows below this fraction of the longest one are chatter, not flights.
 _SHORT: Final = 0.1
 
@@ -76,7 +76,7 @@ class Forced(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """The contacts that a switch set sees [time], and what of the history shows them."""
+    """The contacts for a switch set [time], and the data of the history that show them."""
 
     contacts: Spans
     source: str
@@ -138,7 +138,7 @@ def follow_forced_switches(
 def _see_contacts(
     deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
 ) -> _Seen | None:
-    """Return the contacts as a set sees them, from written forces, else from part momenta if the deck has one contact.
+    """Return the contacts for a set, from written forces, or from part momenta if the deck has one contact.
 
     For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
     the contacts, and for a contact whose force triggers no switch (D2R008).

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # of time
+    Spans = tuple[tuple[float, float], ...]  # spans of time
 
 
 class Sensed(NamedTuple):
@@ -28,11 +28,11 @@ class Sensed(NamedTuple):
     def events(
         self, events: Sequence[SwitchEvent]
     ) -> Iterator[tuple[float, SwitchEvent]]:
-        """Yield time and event of each switch of its parts: rigid while the control is on, deformable again when it
-        is off.
-        """
+        """Yield time and event of each switch: rigid while the control is on, deformable while it is off."""
         set_events = [event for event in events if event.by is self.by]
-        begins_off = self.changes[:1] == (Change(0.0, on=False),)  # nothing to undo
+        begins_off = self.changes[:1] == (
+            Change(0.0, on=False),
+        )  # a control that begins OFF has nothing to undo
         for change in self.changes[begins_off:]:
             for event in set_events:
                 to_rigid = event.line.to_rigid == change.on

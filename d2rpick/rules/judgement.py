@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of warnings of verify that no rule reports, so the check passes them on.
+# Codes of warnings of ``verify`` that no rule reports, so that the check passes them on.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -66,8 +66,7 @@ class Fault(NamedTuple):
 
 @dataclass
 class HistoryJudge:
-    """Judges windows by one reference run: by the energy of the switched parts, or of the whole model if it has no
-    parts.
+    """Judges windows by a reference run: by the energy of the switched parts, or of the model without parts.
 
     The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
@@ -116,7 +115,7 @@ class HistoryJudge:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return what the readers left out or assumed in all judgements so far."""
+        """Return notes of the readers on omissions and assumptions in all judgements so far."""
         return tuple(
             dict.fromkeys(
                 note
@@ -126,7 +125,7 @@ class HistoryJudge:
         )
 
     def _reference(self, parts: tuple[int, ...]) -> Reference:
-        """Return the reference run with the energy of some parts, or of the whole model if there are none."""
+        """Return the reference run with the energy of given parts, or of the whole model without parts."""
         if parts not in self._references:
             if parts:
                 chosen = self.selection._replace(parts=tuple(map(str, parts)))
@@ -185,14 +184,12 @@ class HistoryJudge:
     def contacts(
         self, parts: Collection[int]
     ) -> tuple[tuple[float, float], ...] | None:
-        """Return the spans in which a contact force acts on some parts [time], from their momenta; None if these are
-        unknown.
-        """
+        """Return the spans of contact forces on given parts [time], from their momenta; None if unknown."""
         contact_times = self.pushed(parts)
         return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """Return the same spans as `contacts`, with their uncertainty."""
+        """Return the spans of `contacts` with their uncertainty."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if chosen:
             momenta = next(
@@ -210,7 +207,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Find when the force of a contact, interface or rigid wall acts [time]; None if the history has it not.
+        """Find when the force of a contact, interface or rigid wall acts [time]; None if it is not written.
 
         ``least``: only a force above it counts [force].
         """
@@ -262,7 +259,7 @@ class HistoryJudge:
             return
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy lock in nothing, as a note of the reader reports: only the flight limits the times.
+            # Parts without energy lock in none, as a note of the reader says: only the flight limits the times.
             yield from (
                 _judge_flight(verdict)
                 if verdict.situation.flight.start is not None
@@ -279,12 +276,12 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
     """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
     error.
     """
+    situation, decision = verdict.situation, verdict.decision
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
     if not verdict.admissible and not faults:
         faults = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from faults
-    situation, decision = verdict.situation, verdict.decision
     if verdict.admissible and not decision.reaches(situation.settings.min_quality):
         what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
         yield Fault("D2R209", False, what)
@@ -352,14 +349,14 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
+        return  # Without a vibration the energy is that of td at any tr, up to rounding.
     if candidate.sign_match is False:
-        quantity = "the deformation at tr has the opposite sign of that at td"
+        quantity = "at tr the deformation has the opposite direction"
         yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
         return
     if candidate.lock_in_error is not None:
         error = candidate.lock_in_error
-        quantity = "lock-in error"
+        quantity = "frozen-deformation error"
     elif candidate.level_error is not None:
         error = candidate.level_error
         quantity = "level error"
@@ -385,7 +382,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Return what to do: a tr that suits this td, else a better pair, else where to look for one."""
+    """Return the cure: a tr that suits this td, a better pair, or where to look for one."""
     suggestion = suggest_at(verdict.situation, with_better=False)
     if suggestion.recommended:
         return f"tr = {suggestion.recommended.tr:.6g} suits this td"

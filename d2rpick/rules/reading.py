@@ -1,4 +1,4 @@
-"""Rules D2R001-003, D2R011, D2R109-110 and D2R301-306: input that cannot be read, and input that is not judged."""
+"""Define rules D2R001-003, D2R011, D2R109-110 and D2R301-306: unreadable input, and input that is not judged."""
 
 from __future__ import annotations
 
@@ -453,9 +453,7 @@ def _describe_course(sensed: Sensed) -> str:
 
 
 def _describe_trigger(card: SwitchSet) -> str:
-    """Return how a switching card is triggered if no time on the card decides; empty if a time does, or nothing is
-    switched.
-    """
+    """Return the trigger of a switching card without a time; empty for a card with a time, or without effect."""
     if card.restart:
         return ""
     if card.kind == "restart":

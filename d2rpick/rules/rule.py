@@ -66,7 +66,7 @@ class Example(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A rule of ``check``: what it finds (``summary``), why it matters (``explanation``) and how to mend it (``fix``).
+    """A rule of ``check``: its finding (``summary``), its importance (``explanation``) and the cure (``fix``).
 
     The ``passing`` and ``failing`` decks are both its documentation and its tests.
     """
@@ -76,7 +76,7 @@ class Rule(NamedTuple):
     summary: str
     explanation: str
     fix: str
-    # Takes a Case, or a RunCase if the rule covers Radioss alone.
+    # Function of a Case, or of a RunCase if the rule covers Radioss alone.
     check: Callable[[Any], Iterable[Objection]]
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]

@@ -1,4 +1,4 @@
-"""Rules D2R307, D2R401-409 and D2R411-412: engine files and rigid bodies of a Radioss run."""
+"""Define rules D2R307, D2R401-409 and D2R411-412: engine files and rigid bodies of a Radioss run."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Largest time step while rigid, as a fraction of the rigid window: the release is up to one step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # main nodes that a message lists
+_MOST_LISTED = 8  # largest number of main nodes in a message
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
@@ -41,7 +41,7 @@ _KEEPS: Final = (
     write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
-)  # Ikrem
+)  # with Ikrem 1
 # Arguments of a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
@@ -352,7 +352,9 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
     """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    from d2rpick.deck.mesh import find_parts_with_elements  # loads numpy
+    from d2rpick.deck.mesh import (
+        find_parts_with_elements,
+    )  # imported here: it loads numpy
 
     parts = find_parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)
@@ -443,8 +445,10 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return what no leg switches, and which of its parts deform; None for the parts if no history shows it."""
-    from d2rpick.deck.radioss_run import find_left_rigid  # not above: start-up
+    """Return the bodies that no leg switches, and their deforming parts; None for parts without history."""
+    from d2rpick.deck.radioss_run import (
+        find_left_rigid,
+    )  # imported here to start faster
 
     left_bodies = find_left_rigid(case.run, case.windows.windows)
     return left_bodies, case.judge.deforming(

@@ -1,4 +1,4 @@
-"""Rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and what is attached to them."""
+"""Define rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and their attachments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import CardField
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # ids of the deck that a message lists next to an unknown id
+_NEAREST = 3  # most ids of the deck that a message lists next to an unknown id
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -244,7 +244,7 @@ def _check_ids_exist(case: Case) -> Iterator[Objection]:
 
 def _list_nearest(number: int, parts: DeckParts) -> str:
     """Return the nearest part ids of the deck with their titles, as text in brackets."""
-    from heapq import nsmallest  # not above: start-up
+    from heapq import nsmallest  # imported here to start faster
 
     near = sorted(
         nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))
@@ -257,7 +257,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield what a line of a card names but the deck does not define, as kind (part set, part or lead part) and id."""
+    """Yield kind (part set, part or lead part) and id of what a line names but the deck does not define."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -314,7 +314,9 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import find_shared_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_shared_nodes,
+    )  # imported here: it loads numpy
 
     for (low, high), node in find_shared_nodes(cards, bodies).items():
         if _is_rigid_together(case, first[low].unit, first[high].unit):
@@ -393,7 +395,9 @@ def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
-    from d2rpick.deck.ls_dyna_inventory import find_first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_first_parts,
+    )  # imported here: it loads numpy
 
     return find_first_parts(cards, parts)
 
@@ -597,7 +601,9 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True) if joining else ()
     if not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import (
+        find_parts_of_nodes,
+    )  # imported here: it loads numpy
 
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
     joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))

@@ -1,6 +1,4 @@
-"""Rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the window times, also compared with an
-energy history.
-"""
+"""Define rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the times of windows."""
 
 from __future__ import annotations
 
@@ -46,7 +44,7 @@ _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # With so few cards D2R102 and D2R105 report the same mistake.
+_FEW = 2  # With at most this number of cards D2R102 and D2R105 report the same mistake.
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
@@ -143,7 +141,7 @@ def _check_times_in_order(case: Case) -> Iterator[Objection]:
         together = (
             opening.kind == closing.kind == "restart"
             and opening.card.file == closing.card.file
-        )  # D2R117
+        )  # rule D2R117 reports cards with such times
         if (
             first.td is not None
             and first.td <= first.tr
@@ -449,7 +447,7 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0122659", "0.064"))
 @make_rule_decorator(
-    "D2R202", ERROR, "the deformation at tr has the opposite sign of that at td", BOTH
+    "D2R202", ERROR, "at tr the deformation has the opposite direction", BOTH
 )
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the

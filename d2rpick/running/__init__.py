@@ -1,1 +1,1 @@
-"""Runs while they are computed: what the states so far tell, and what should be done next."""
+"""Follow runs while they are computed: what their states show so far, and what to do next."""

@@ -1,4 +1,4 @@
-"""Check before anything is computed that a first run can switch itself."""
+"""Check, before anything is computed, that a first run can switch itself."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits
 
 
-NO_CONTACT: Final = "no contact and no rigid wall, so nothing would end a flight"
+NO_CONTACT: Final = (
+    "the deck has no contact and no rigid wall, so nothing would end a flight"
+)
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError if a support holds one of the parts, since its force is not that of a contact."""
+    """Raise DeckError if a support holds one of the parts, since its force is not a contact force."""
     if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"
@@ -37,10 +39,10 @@ def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None
 
 
 def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
-    """Give kind of sensor and id of each contact and rigid wall."""
+    """Yield sensor kind and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            # /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
+            # keywords are /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
             yield "INTER", get_number(card, 2) or get_number(card, 3)
     for card in starter.named("RWALL"):
         yield "RWALL", get_number(card, -1)

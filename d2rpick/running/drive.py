@@ -42,12 +42,12 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest step of a rigid leg over the mean step of the deformable legs.  A rigid leg then costs a few percent of a
-# deformable one, and its history still has enough states to show a contact.
+# Largest step of a rigid leg relative to the mean step of the deformable legs.
+# A rigid leg then costs a few percent of a deformable one, and its history has enough states to show a contact.
 _STEP_RATIO: Final = 5.0
-# A flight that was shorter than the wait is reported if it lasted for this share of the wait.
+# A flight shorter than the wait is reported if it lasted for this share of the wait.
 _REPORTED: Final = 0.5
-# Pause between two checks whether the solver is running, and how long it may be silent before this is reported [s].
+# Pause between two checks of the solver, and its longest silence before a report [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
@@ -64,7 +64,7 @@ class Driven:
     why : str
         Reason of the wait.
     saved : (float or None, float or None)
-        Share of a deformable run that is saved, by the cost model and by processor time; None if unknown.
+        Share of a deformable run that is saved, by the cost model and by CPU time; None if unknown.
     """
 
     run: OpenedRun
@@ -78,7 +78,7 @@ class Driven:
 
 @dataclass
 class Driver:
-    """Computes one run in its folder, from where its journal ends.
+    """Computes one run in its folder, from the end of its journal on.
 
     ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
@@ -95,7 +95,7 @@ class Driver:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, discarded ones included, except those before whose start the run went back."""
+        """Computed legs, including discarded ones, except those before whose start the run went back."""
         legs: list[Leg] = []
         for record in self.journal.records:
             if record["event"] == "ended":
@@ -106,14 +106,14 @@ class Driver:
 
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
-        """Warnings for all windows in which parts still swung at tr."""
+        """Warnings for all windows in which parts still oscillated at tr."""
         messages = dict.fromkeys(
             record["place"] for record in self.journal.all("ended")
         )
         return tuple(Caution("out-of-place", text) for text in messages if text)
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless that is done.
+        """Copy the deck into the folder and run the starter, unless this was done.
 
         Raises
         ------
@@ -139,14 +139,14 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed; before the first one, for how many ``seconds`` the starter runs."""
+        """Describe the leg that is being computed; before the first one, how many ``seconds`` the starter runs."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
-        return f"leg {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
+        return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
-        """Compute leg after leg to the end of the run.
+        """Compute leg after leg up to the end of the run.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Driver:
         """
         if legs := self.legs:
             self.told(
-                f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].order.until:.6g}"
+                f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
         while order := self._choose_next():
             self.at = order
@@ -166,7 +166,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg; go back leg by leg until the restart that it begins with is whole."""
+        """Choose the next leg; go back leg by leg until its initial restart is complete."""
         legs = self.legs
         leg_count = len(legs)
         order = choose_next_leg(legs, self.limits)
@@ -177,7 +177,7 @@ class Driver:
             self.journal.add("back", legs=len(legs))
             start = 0.0 if order is None else order.start
             self.told(
-                f"the restart of the last leg is not whole: the run goes back to {start:.6g}"
+                f"the restart file of the last engine run is incomplete: the run goes back to {start:.6g}"
             )
         return order
 
@@ -203,7 +203,7 @@ class Driver:
         self.journal.add("started", order=order)
         self._start_solver("engine", number)
         self.told(
-            f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
+            f"engine run {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
 
     def _start_solver(self, program: str, number: int) -> None:
@@ -232,12 +232,10 @@ class Driver:
                 if silence > reported_at:
                     reported_at = 2 * silence
                     self.told(
-                        f"the solver has written nothing for {silence:.0f} s; Ctrl-C ends it, then --resume"
+                        f"the solver has written nothing for {silence:.0f} s; stop it with Ctrl-C, then --resume"
                     )
         except KeyboardInterrupt:
-            self.told(
-                "stopping: the leg that is being computed is begun again with --resume"
-            )
+            self.told("stopping: --resume computes the current engine run again")
             self.solver.end()
             raise
 
@@ -291,11 +289,12 @@ class Driver:
         if order in self._repeated:
             listing = self.solver.file(order.number, ".out")
             raise D2RPickError(
-                f"{listing}: the leg left no whole restart; make room on the disk, then --resume"
+                f"{listing}: the engine run left no complete restart file; make room on the disk, then --resume"
             )
         self._repeated.add(order)
         self.told(
-            f"leg {order.number}: it left no whole restart or history, and is begun again at {order.start:.6g}"
+            f"engine run {order.number}: its restart file or history is incomplete; computing it "
+            f"again from {order.start:.6g}"
         )
         self.journal.add("lost", order=order)
 
@@ -316,10 +315,12 @@ class Driver:
         if not failed_before or not self.legs or has_states:
             words = self.solver.last_words(order.number)
             path = self.solver.file(order.number, ".out")
-            raise D2RPickError(f"{path}: the solver failed: {words}; --resume goes on")
+            raise D2RPickError(
+                f"{path}: the solver failed: {words}; continue with --resume"
+            )
         self.journal.add("back", legs=len(self.legs) - 1)
         self.told(
-            f"leg {order.number} failed again before its first state: the leg before it is computed again"
+            f"engine run {order.number} failed again before its first state; computing the engine run before it again"
         )
 
 

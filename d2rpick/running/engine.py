@@ -1,4 +1,4 @@
-"""Start and stop the processes of a solver in the folder of a run, and read what they leave.
+"""Start and stop the processes of a solver in the folder of a run, and read their output.
 
 Names and heads of restarts come from runs with OpenRadioss 2026-08.
 """
@@ -41,13 +41,13 @@ _CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
 _TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
 # Bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# The listing of a starter reports errors first and much else after them: how many bytes are read from its end, how an
-# error begins, and how many lines it has.
+# The listing of a starter reports errors first, and much output follows them.
+# The values are the bytes read from its end, the beginning of an error, and the number of its lines.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
-# A complete restart file has at least this share of the size of the one that the starter wrote.
+# A complete restart file has at least this share of the size of the one written by the starter.
 _WHOLE: Final = 0.98
-# Time that a solver has to stop, and pause between two checks whether it has [s].
+# Time that a solver has to stop, and pause between two checks [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
@@ -114,7 +114,7 @@ def _find_installed(program: str) -> list[str]:
 
 
 def _make_environment(threads: int) -> dict[str, str]:
-    """Return the environment of the programs: ours, with what those of an installation need."""
+    """Return the environment of the programs: the current one with the variables of an installation."""
     environment = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
     libraries = os.environ.get("LD_LIBRARY_PATH", "")
     if home := os.environ.get(_HOME):
@@ -126,11 +126,11 @@ def _make_environment(threads: int) -> dict[str, str]:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Keep every other driver out of a folder; D2RPickError if one is running there."""
+    """Lock a folder against other drivers; D2RPickError if one is running there."""
     lock = _lock(folder / ".drive.lock")
     if lock is None:
         raise D2RPickError(
-            f"{folder}: another d2rpick drives this run; wait for it, or choose another folder"
+            f"{folder}: another d2rpick drives this run; wait for its end, or choose another folder"
         )
     try:
         yield
@@ -161,7 +161,7 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
-        self._signal = 0  # that ended the last process; 0 if none did
+        self._signal = 0  # signal that ended the last process; 0 if none did
 
     def file(self, number: int, suffix: str) -> Path:
         """Return the path of a file of a leg, 0 for the starter."""
@@ -172,7 +172,7 @@ class Solver:
         return self.folder / f"{self.name}T{number:02d}"
 
     def clear(self, number: int) -> None:
-        """Remove what an earlier leg of this number left."""
+        """Remove the files of an earlier leg with this number."""
         suffixes = (".ctl", ".out", ".log")
         paths = [self.file(number, suffix) for suffix in suffixes]
         for path in (self.history(number), *paths, *self._list_restarts(number)):
@@ -189,12 +189,12 @@ class Solver:
         lock = _lock(self._lock_path)
         if lock is None:
             raise D2RPickError(
-                f"{self.folder}: a solver is at work there; wait for its end"
+                f"{self.folder}: a solver is running there; wait for its end"
             )
         try:
             _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:
-                # In its own session, Ctrl-C does not reach it: the driver stops all processes of the solver.
+                # In its own session Ctrl-C does not reach it: the driver stops all processes of the solver.
                 self._process = subprocess.Popen(
                     command, cwd=self.folder, env=_make_environment(self.threads), stdin=subprocess.DEVNULL, stdout=log,
                     stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
@@ -230,7 +230,7 @@ class Solver:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            with suppress(KeyboardInterrupt):  # pressed again
+            with suppress(KeyboardInterrupt):  # the user may interrupt again
                 while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
 
@@ -248,7 +248,7 @@ class Solver:
         return b"NORMAL TERMINATION" in _read_tail(self.file(number, ".out"))
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Return cycles and processor time [s] of a leg; None if its listing does not contain them."""
+        """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
         listing = _read_tail(self.file(number, ".out"))
         cycles, seconds = _CYCLES.findall(listing), _TOTAL.findall(listing)
         return (
@@ -257,7 +257,7 @@ class Solver:
         )
 
     def whole(self, number: int) -> bool:
-        """Return True if a leg, 0 for the starter, has left whole restarts of all domains.
+        """Return True if a leg, or the starter (0), has left complete restarts of all domains.
 
         A restart of OpenRadioss begins with its own name.  It is as long as the one of the starter except for what has
         changed in the contacts.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -276,7 +276,7 @@ class Solver:
         return True
 
     def came_to(self, number: int, end: float) -> bool:
-        """Return True if the history of a leg has a state at a time or after it [time]."""
+        """Return True if the history of a leg has a state at or after a time [time]."""
         path = self.history(number)
         try:
             times = TimeHistory(path.read_bytes(), str(path)).time
@@ -285,7 +285,7 @@ class Solver:
         return bool(times.size) and float(times[-1]) >= end
 
     def started_well(self) -> bool:
-        """Return True if the starter has ended without an error and left a whole restart."""
+        """Return True if the starter has ended without an error and left a complete restart."""
         return self.whole(0) and not _STARTER_ERROR.search(
             _read_tail(self.file(0, ".out"))
         )
@@ -315,7 +315,7 @@ class Solver:
                 path.unlink(missing_ok=True)
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for a leg that starts with this share of the run still to come."""
+        """Raise D2RPickError if the disk has no room for a leg that begins with this share of the run remaining."""
         sizes = [
             path.stat().st_size
             for path in self.folder.iterdir()
@@ -328,7 +328,7 @@ class Solver:
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
-                f"{self.folder}: leg {number} may need {needed / 1e6:.3g} MB, {free / 1e6:.3g} MB are free; "
+                f"{self.folder}: engine run {number} may need {needed / 1e6:.3g} MB, {free / 1e6:.3g} MB are free; "
                 "make room, then --resume"
             )
 
@@ -354,7 +354,7 @@ def _read_tail(path: Path, size: int = _TAIL_SIZE) -> bytes:
 
 
 def _read_lines(path: Path, size: int = _TAIL_SIZE) -> list[str]:
-    """Return the lines at the end of a file; none if it is not there."""
+    """Return the lines at the end of a file; none if it is missing."""
     return _read_tail(path, size).decode("latin-1").splitlines()
 
 

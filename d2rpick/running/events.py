@@ -1,4 +1,4 @@
-"""Find the events of a run so far: pushes, flights, contacts, when to switch, and rigid parts."""
+"""Find the events of a run so far: pushes, flights, contacts, advised switches, and rigid parts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from d2rpick.running.inner_motion import InnerMotion
     from d2rpick.running.witness import Quiet
 
-    # Events of the flights that are decided, by the start of each flight and when it was seen.
+    # Events of the flights that are over, by the start of each flight and the time when it was seen.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
 
 
 class Event(NamedTuple):
-    """What happened, as a stable word, when, and at which state it was ``seen`` [time], with a sentence.
+    """An event: a stable word, its time, the state at which it was ``seen`` [time], and a sentence.
 
     ``wait`` is how long no force had to act to count as flight [time], ``left`` what changed meanwhile, as a share of
     the largest value, ``tr`` the advised time [time].  They are None if an event has none.
@@ -68,7 +68,7 @@ def find_events(
 def _is_rigid(
     tr: float | None, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> bool:
-    """Return True if parts are rigid already at a tr that is advised."""
+    """Return True if parts are already rigid at an advised tr."""
     if tr is None:
         return False
     return any(start <= tr <= end for start, _, end in rigid_times)
@@ -77,20 +77,22 @@ def _is_rigid(
 def _describe_rigid_times(
     history: History, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> Iterator[Event]:
-    """Give the events of parts that become rigid and deformable again, except bodies that are rigid from the start."""
+    """Yield the events of parts that become rigid and deformable, except bodies that are always rigid."""
     for start, seen_at, end in rigid_times:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
             continue
-        message = "parts have become rigid: no quantity of a part is believed until they deform again"
+        message = (
+            "parts have become rigid: part data are not used until they deform again"
+        )
         yield Event("rigid", start, seen_at, message)
         if end < history.time[-1]:
-            yield Event("deformable", end, end, "no part is rigid any more")
+            yield Event("deformable", end, end, "all parts deform again")
 
 
 def _describe_flight(
     history: History, motion: InnerMotion, flight: Quiet, decided: Decided
 ) -> Iterator[Event]:
-    """Give the events of a flight: its start, when to switch, and its contact."""
+    """Yield the events of a flight: its start, the advised switch, and its contact."""
     key = (flight.start, flight.seen)
     events = decided.get(key)
     if events is None:
@@ -109,17 +111,19 @@ def _describe_flight(
 
 
 def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
-    """Report that a flight is seen, by what evidence, and why it was not seen before."""
-    quantity = "the energy of the contacts"
+    """Report that a flight is seen, by which evidence, and why it was not seen before."""
+    quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
     wait = motion.wait(flight.start, flight.seen)
-    reason = f"the wait is {flight.wait:.4g}: {wait.reason}" if wait else ""
-    landing = "nothing tells when it lands"
+    reason = (
+        f"required force-free time {flight.wait:.4g}: {wait.reason}" if wait else ""
+    )
+    landing = "landing time unknown"
     if flight.level is not None:
-        landing = f"on level ground it lands about {flight.level:.4g}"
+        landing = f"on level ground it lands at about {flight.level:.4g}"
     evidence = (
-        f"{quantity} is constant within {flight.left:.1e} of its largest value"
+        f"{quantity} is constant within {flight.left:.1e} of its maximum"
         f" for {flight.seen - flight.start:.4g}"
     )
     message = "; ".join(filter(None, (evidence, reason, landing)))
@@ -132,7 +136,7 @@ def _suggest_switch(
     """Advise when to switch in a flight."""
     wait = motion.wait(flight.start, flight.seen)
     if wait and wait.source == "at-rest":
-        message = "switch now: nothing vibrates, so that any tr is right, and the earlier it is the more it saves"
+        message = "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
         now = flight.seen
         yield Event("switch", now, now, message, flight.wait, tr=now)
     else:
@@ -140,12 +144,12 @@ def _suggest_switch(
 
 
 def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise a switch once the internal energy is high; if it is not within one more wait, when it was highest."""
+    """Advise a switch when the internal energy is high, or after one more wait when it was highest."""
     last = flight.seen + flight.wait
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
         low, high, enough = range_of_energy(history, now, flight.wait)
-        level = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
+        level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
         if flight.end is not None and now >= flight.end:
             return
         if energy >= enough:
@@ -153,23 +157,21 @@ def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event
             yield Event("switch", now, now, message, flight.wait, tr=now)
             return
         if now == flight.seen:
-            message = (
-                f"not yet: {level}; its highest value is waited for until {last:.6g}"
-            )
+            message = f"not yet: {level}; waiting until {last:.6g} for its maximum"
             yield Event("later", last, now, message, flight.wait)
     is_over = flight.end is not None and flight.end <= last
     if history.time[-1] > last and not is_over:
         tr = highest_energy(history, flight.seen, last)
         now = float(history.between(last, history.time[-1])[0][0])
         message = (
-            f"the internal energy was highest at {tr:.6g}: a restart from before can switch there"
+            f"the internal energy was highest at {tr:.6g}: restart from an earlier state to switch there"
             f"{_warn_of_swing(history, flight, tr)}"
         )
         yield Event("switch", tr, now, message, flight.wait, tr=tr)
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts swing too much for a flight that has lasted up to tr; "" if not."""
+    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise ""."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

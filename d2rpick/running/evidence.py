@@ -1,4 +1,4 @@
-"""Find the flights of some parts in a record that grows.
+"""Find the flights of given parts in a growing record.
 
 Each answer depends on the states up to it, never on when somebody looked.  A growing record therefore has the flights
 of the finished one.
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.running.witness import Needed
 
-# tr is good if the internal energy is this share of the way from its lowest to its highest value within one wait.  In
-# computed runs a tr in a trough kept half of the energy that td should have, one at a peak 0.9 of it and more.
+# tr is good if the internal energy is at least this share of the way from its minimum to its maximum within one wait.
+# In computed runs a tr in a trough kept half of the energy that td should have, one at a peak at least 0.9 of it.
 _HIGH: Final = 0.75
-# Gravity is determined from so many states before a flight and so many in it, at most.
+# Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
 
 class GrowingEvidence:
-    """Finds since when no force has acted on the parts of a growing record, and their flights."""
+    """Finds the time without force, and the flights, of the parts of a growing record."""
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
         self._of_parts: list[GrowingWitness] = []
-        self._of_model: list[GrowingWitness] = []  # at most one
-        # Witnesses of parts that are not over, by the numbers of their parts.
+        self._of_model: list[GrowingWitness] = []  # at most one witness
+        # Witnesses of sets of parts that still continue, by the indices of their parts.
         self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        # For each state, which parts have moved so far, and whether the parts have all of the momentum of the model.
+        # For each state, the parts that have moved so far, and whether they have the complete momentum of the model.
         self._moved, self._complete = GrowingColumn(), GrowingColumn()
         self._largest_momentum = 0.0
 
@@ -54,7 +54,7 @@ class GrowingEvidence:
 
     @property
     def witnesses(self) -> list[GrowingWitness]:
-        """Witnesses of parts, then the one of the whole model if it writes a momentum or contact energy."""
+        """Witnesses of parts, then that of the model if it has a momentum or contact energy."""
         return [*self._of_parts, *self._of_model]
 
     def take(self, states: History) -> None:
@@ -123,7 +123,7 @@ class GrowingEvidence:
         return self._moved.rows[-len(moved) :]
 
     def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
-        """Split the last ``count`` states where a further part begins to move, or the parts begin to lack momentum.
+        """Split the last ``count`` states where another part begins to move, or momentum begins to be missing.
 
         Gives for each piece its states, the numbers of the parts that move, and whether the momenta are complete.
         """
@@ -203,7 +203,7 @@ class GrowingEvidence:
         return laws.gravity(start, so_far.time.size - 1)
 
     def free_since(self, time: float) -> float:
-        """Return since when no force had acted at a time, by the states up to it; the time itself without states."""
+        """Return the start of the time without force up to a time; the time itself without states."""
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
@@ -212,7 +212,7 @@ class GrowingEvidence:
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return start and end of all times without force that ended after ``since`` and were shorter than the wait."""
+        """Return all force-free intervals that ended after ``since`` and were shorter than the wait."""
         if not self.witnesses:
             return ()
         going_on = [
@@ -244,7 +244,7 @@ class GrowingEvidence:
         return None
 
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
-        """Return when rigid bodies had the momenta of parts: start, the state that shows it, and end [time].
+        """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
 
         A stretch that goes on ends with the record.
         """
@@ -264,7 +264,7 @@ class GrowingEvidence:
 
 
 def highest_energy(history: History, start: float, end: float) -> float:
-    """Return the state from ``start`` to ``end`` with the highest internal energy; of equal ones the last [time]."""
+    """Return the state from ``start`` to ``end`` with the highest internal energy, the last of equal ones [time]."""
     time, energy = history.between(start, end)
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
@@ -272,14 +272,14 @@ def highest_energy(history: History, start: float, end: float) -> float:
 def range_of_energy(
     history: History, now: float, wait: float
 ) -> tuple[float, float, float]:
-    """Return the lowest and highest internal energy within the last wait, and the least one that is good for tr."""
+    """Return lowest and highest internal energy within the last wait, and the lowest one that is good for tr."""
     energy = history.between(now - wait, now)[1]
     low, high = float(energy.min()), float(energy.max())
     return low, high, low + _HIGH * (high - low)
 
 
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
-    """Give a flight the end that another witness has seen, if its own witness ended at ``last_time`` in the flight."""
+    """Return a flight with the end seen by another witness, if its own witness ended at ``last_time`` in it."""
     if flight.end is not None:
         return flight
     ends = (
@@ -301,7 +301,7 @@ def _get_contact_energy(
 
 
 def _list_sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Give the sets of parts that may fly together: the chosen parts, these with all that the deck joins to them, all.
+    """Yield the sets of parts that may fly together: chosen parts, chosen and connected parts, all parts.
 
     Parts are given by their numbers in the momenta.
     """

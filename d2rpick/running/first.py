@@ -1,4 +1,4 @@
-"""Print the cards of a first run that switches itself: without a reference, the solver sees flights by contact forces.
+"""Print the cards of a first run that switches itself: the solver detects flights by contact forces.
 
 Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
@@ -43,38 +43,38 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
-# The starter of OpenRadioss reads /RBODY/OFF in so many engine files.  A leg after the end of the run takes one step.
+# Number of engine files from which the OpenRadioss starter reads /RBODY/OFF; a leg after the end takes one step.
 _MOST_LEGS: Final = 9
-# The largest step while rigid is the wait over this number: a contact is seen at most so late.
+# The largest step while rigid is the wait divided by this number, so a contact is seen at most that late.
 _STEPS_PER_WAIT: Final = 300
-# LS-DYNA: a contact does not release the parts for the wait over this number after they became rigid.
+# LS-DYNA: time after a switch in which a contact does not release the parts, as the wait divided by this number.
 _DELAYS_PER_WAIT: Final = 100
 # Radioss: loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
-_UNSEEN: Final = "pushes without a contact, so that a flight is not seen by contacts"
+_UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
 _OF_ALL: Final = (
-    "A first run: no reference tells the level at td, so that none is matched.",
-    "Only forces of contacts are seen: nothing else may act on the parts but gravity.",
+    "A first run: without a reference run the energy at td is unknown, so tr is not matched to it.",
+    "Only contact forces are monitored: apart from gravity, nothing else may act on the parts.",
 )
 _OF_RADIOSS: Final = (
-    "Each deformable leg ends when no contact has had a force for the wait.",
-    "No window keeps a margin: each rigid leg ends in the first step of a contact, {cap:g} at most into it.",
-    "A contact of the parts with themselves counts: while it pushes, they do not fly.",
-    "Legs behind the end of the run take one step.",
+    "Each deformable engine run ends when no contact has had a force for the force-free time.",
+    "No window keeps a margin: each rigid engine run ends in the first step of a contact, at most {cap:g} into it.",
+    "A contact of the parts with each other counts too: while it has a force, they do not fly.",
+    "Engine runs after the end of the run take one step.",
 )
 _OF_WALLS: Final = (
-    "A rigid body that meets a rigid wall in the last step of its leg is stopped in that step: in a computed run it had"
-    " a momentum of 511 after it, for 365 deformable. drive keeps a margin before it."
+    "A rigid body that meets a rigid wall in the last step of its engine run is stopped in that step: in a test it had"
+    " a momentum of 511 afterwards, a deformable body 365. d2rpick drive keeps a margin before the wall."
 )
 _OF_LS_DYNA: Final = (
-    "CODE 2 has no wait: parts become rigid without force after TIME1, also before a push and between two of them.",
-    "Other contacts, rigid walls and loads are not seen by these switches.",
-    "These cards were not tried with the solver.",
+    "CODE 2 has no force-free time: after TIME1, zero force makes parts rigid, even between two pulses.",
+    "These switches do not react to other contacts, rigid walls and loads.",
+    "These cards were not tested with the solver.",
 )
 # LS-DYNA: loads that act without a contact, and those of them that are gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA: offset before a contact over the thickest shell.  It must be above the thickness of the contact: half of the
-# thickness of each shell.
+# LS-DYNA: offset before a contact relative to the thickest shell.
+# It must exceed the thickness of the contact, which is half of the thickness of each shell.
 _OFFSET_THICKNESSES: Final = 2
 
 
@@ -137,8 +137,8 @@ def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     period = find_inner_period(inventory)
     if period is None:
         raise ArgumentError(
-            f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
-            " without force that counts as flight, above half of the longest inner period"
+            f"`wait` cannot be derived from {path} (no masses on linear springs found); give the force-free time that"
+            " marks a flight: more than half of the longest natural period of the parts"
         )
     half = float(f"{period.time / 2:.3g}")
     return Wait(
@@ -173,7 +173,7 @@ def _make_radioss_card(
     files = _write_legs(run, bodies, sensors, largest_step, at_rest=at_rest)
     reason = _explain_wait(wait)
     if at_rest:
-        reason = f"at rest in free fall: rigid from 0; then {reason}"
+        reason = f"in free fall from rest: rigid from 0; then {reason}"
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
     of_walls = (_OF_WALLS,) if run.starter.named("RWALL") else ()
     notes = (reason, *bodies.notes, *_OF_ALL, *of_radioss, *of_walls)
@@ -191,7 +191,7 @@ def _refuse_loads(starter: Starter) -> None:
 def _falls_from_rest(
     run: RadiossRun, inventory: Inventory, parts: Collection[int]
 ) -> bool:
-    """Return True if the parts are at rest at first and gravity acts on them; no support holds them."""
+    """Return True if the parts are initially at rest without support, and gravity acts on them."""
     if run.starter is None or run.starter.named("INIVEL"):
         return False
     if any(leg.starts for leg in run.legs):
@@ -200,7 +200,7 @@ def _falls_from_rest(
 
 
 class _Sensors(NamedTuple):
-    """The cards of the sensors, and the ids of those of a contact force and of a flight."""
+    """The cards of the sensors, and the ids of the sensor of a contact force and of a flight."""
 
     text: str
     contact: int
@@ -210,7 +210,7 @@ class _Sensors(NamedTuple):
 def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
-    """Write sensors of a contact force within the wait, and of a flight: no such force, from a first time on."""
+    """Write sensors of a contact force within the wait, and of a flight without such a force."""
     cards: list[str] = []
     for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
         row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
@@ -241,7 +241,7 @@ def _write_legs(
     *,
     at_rest: bool,
 ) -> dict[str, str]:
-    """Write the engine files, deformable and rigid in turn; rigid first if the parts fall from rest."""
+    """Write the engine files, deformable and rigid alternately; rigid first if the parts fall from rest."""
     (leg,) = run.legs
     other_nodes = tuple(
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
@@ -269,7 +269,7 @@ def _write_legs(
 
 def _explain_wait(wait: Wait) -> str:
     """Return the note on the wait."""
-    return f"flight is {wait.time:.4g} without force: {wait.reason}"
+    return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 
 # LS-DYNA.
@@ -294,12 +294,10 @@ def _make_ls_dyna_card(
         "INITIAL_VELOCITY"
     )
     if after is None and falls_from_rest:
-        notes.append("At rest in free fall: rigid from 0, TIME1 0.")
+        notes.append("In free fall from rest: rigid from 0, TIME1 0.")
     notes += [*_OF_ALL, *_OF_LS_DYNA, offset_note]
     if after is None and not falls_from_rest:
-        notes.append(
-            "TIME1 is 0: give the time of the last push (--after) where it is known."
-        )
+        notes.append("TIME1 is 0: if you know the end of the load, give it (--after).")
     delay = wait.time / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
     lines += write_header(

@@ -1,4 +1,4 @@
-"""Determine the wait: how long no force must act to count as flight, from how parts swing inside the body.
+"""Determine the wait, the force-free time that shows a flight, from the inner oscillations of the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -25,32 +25,32 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
 
-# A change of a velocity is a swing from this share of its range so far on.
+# A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
-# A swing is measured from 10 % to 90 % of its way, since its ends may be flat.  A harmonic motion takes this share of
-# half its period for that.
+# An oscillation is measured from 10 % to 90 % of its way, since its ends may be flat.
+# A harmonic motion takes this share of half its period for that.
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# A swing with less than this share of the strongest mean force so far is the rotation of a body.
+# An oscillation with less than this share of the strongest mean force so far is a rotation of the body.
 _ROTATION: Final = 0.05
-# A swing of fewer states is a jump, as of an energy in the first state.
+# An oscillation with fewer states is a jump, as of an energy in the first state.
 _FEWEST_STATES: Final = 4
-# A part whose velocity against the others is less than this share of the velocity of all does not swing.
+# A part oscillates only if its relative velocity exceeds this share of the velocity of all parts.
 _AT_REST: Final = 1e-3
-# A swing that has lasted for so many times the longest half period before it may last for any time.
+# An oscillation that lasts this many times the longest half period before it may continue for any time.
 _MUCH_LONGER: Final = 2.0
-# Limits in half periods according to the deck: a longer free swing is the rotation of a body, and a pushed swing counts
-# as no longer than the second limit.
+# Limits in half periods according to the deck: a longer free oscillation is the rotation of a body.
+# A forced oscillation is limited to the second value.
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# A period is known to 10 %: a given wait may be shorter than half of it by so much.
+# A period is known to 10 %, so a given wait may be this share of half the period.
 _EXACT: Final = 0.9
-# Parts with a smaller share of the mass hardly move the others.
+# Parts with a smaller share of the mass hardly move the other parts.
 _HEAVY: Final = 0.05
-# Internal energy below this share of the largest energy is round-off: nothing vibrates.
+# Internal energy below this share of the largest energy is round-off, so there is no vibration.
 _ROUND_OFF: Final = 1e-6
 
 
 class Wait(NamedTuple):
-    """How long no force must act to count as flight [time], with its source and reason.
+    """Force-free time that shows a flight [time], with its source and reason.
 
     ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
     [time]; None if that is the wait itself.
@@ -63,7 +63,7 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """A swing: half a period of an inner motion from ``begin`` to ``end``, which shows at ``seen_at`` [time].
+    """Half a period of an inner motion from ``begin`` to ``end``, which is known at ``seen_at`` [time].
 
     ``half`` is half of its period [time], ``strength`` its mean change by time, 0 if that is less than a swing.
     """
@@ -76,7 +76,7 @@ class _HalfPeriod(NamedTuple):
 
 
 class _OngoingSwing(NamedTuple):
-    """A swing that is not over: its mean change by time, its duration, and the longest half period before it [time]."""
+    """An unfinished oscillation: its mean rate of change, its duration, and the longest half period before it."""
 
     strength: float
     duration: float
@@ -84,23 +84,23 @@ class _OngoingSwing(NamedTuple):
 
 
 class _Motion:
-    """One quantity that swings, as the velocity of a part along an axis: its states and swings so far.
+    """One oscillating quantity, such as a velocity component of a part: its states and half periods so far.
 
     Half a period takes ``halves_per_swing`` swings of its values: 1 for a velocity, 2 for an energy.
     """
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
-        self.has_free_swing = False  # whether it has swung once without a push
+        self.has_free_swing = False  # True after an oscillation without a push
         self.swings: list[_HalfPeriod] = []
         self._columns = {
             name: GrowingColumn() for name in ("time", "values", "least_swing")
         }
         self._lowest, self._highest = np.inf, -np.inf
-        # State of the last turn, None before anything moves, and of the extreme value since then.
+        # State of the last turn, None before any motion, and of the extreme value since then.
         self._turn: int | None = None
         self._extreme, self._rising = 0, False
-        self._first_moved: float | None = None  # [time]
+        self._first_moved: float | None = None  # time of the first motion [time]
 
     @property
     def begins(self) -> float:
@@ -115,7 +115,7 @@ class _Motion:
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,) and give the swings that show in them: changes of at least ``least_swing`` (k,)."""
+        """Append states (k,) and return the half periods completed by them, of at least ``least_swing`` (k,)."""
         lows = np.minimum(np.minimum.accumulate(values), self._lowest)
         highs = np.maximum(np.maximum.accumulate(values), self._highest)
         self._lowest, self._highest = float(lows[-1]), float(highs[-1])
@@ -148,7 +148,7 @@ class _Motion:
     def _follow(
         self, state: int, value: float, least_swing: float, extreme_value: float
     ) -> _HalfPeriod | None:
-        """Follow the swing by a state; return it if the values have gone back by ``least_swing`` since its end."""
+        """Follow the motion by a state; return a half period once values went back by ``least_swing`` after its end."""
         goes_on = value >= extreme_value if self._rising else value <= extreme_value
         if goes_on:
             self._extreme = state
@@ -170,7 +170,7 @@ class _Motion:
     def _measure(
         self, begin: int, end: int, state: int, least_swing: float
     ) -> _HalfPeriod:
-        """Measure the swing between two states, which shows at a third one."""
+        """Measure the half period between two states, which is known at a third one."""
         time = self._columns["time"].rows
         values = self._columns["values"].rows[begin : end + 1]
         distance = np.abs(values - values[0])
@@ -185,7 +185,7 @@ class _Motion:
         )
 
     def find_ongoing(self, now: float) -> _OngoingSwing | None:
-        """Return the swing that is not over ``now``; None if the motion has come to rest or is a rotation."""
+        """Return the unfinished oscillation ``now``; None if the motion has come to rest or is a rotation."""
         time, values = self._columns["time"].rows, self._columns["values"].rows
         if self._turn is None or self._first_moved is None or self._first_moved > now:
             return None
@@ -205,7 +205,7 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period that is known ``since`` a time: of what, and when that swing was ``over`` [time].
+    """The longest half period known ``since`` a time: its source, and its end ``over`` [time].
 
     ``strength`` is the strongest mean change by time so far, ``swing`` half of the longest swing, pushed or not [time].
     """
@@ -219,7 +219,7 @@ class _Longest(NamedTuple):
 
 
 class InnerMotion:
-    """The wait at each state of a record, from the inner motion up to there.
+    """The wait at each state of a record, from the inner motion up to that state.
 
     ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
     """
@@ -236,17 +236,17 @@ class InnerMotion:
             self._least = Wait(before, "record", "as in the flight before")
         self._evidence = GrowingEvidence()
         self._part_motions: list[_Motion] = []
-        # Those of parts that still move, by the number of the part and of the axis.
+        # Motions that still continue, by the indices of part and axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._heavy: tuple[int, ...] = ()
         self._largest_speed = self._largest_energy = 0.0
-        # What was known in the course of the record, ascending.
+        # Longest half periods in the order in which they became known.
         self._longest_of_parts: list[_Longest] = []
         self._longest_of_energy: list[_Longest] = []
 
     def take(self, states: History, evidence: GrowingEvidence) -> None:
-        """Append states, which the ``evidence`` has taken already."""
+        """Append states that the ``evidence`` has taken already."""
         self._evidence = evidence
         for momenta in states.momenta:
             if momenta.parts is not None and momenta.masses is not None:
@@ -260,7 +260,7 @@ class InnerMotion:
             self._learn(swing, self._energy)
 
     def _follow_parts(self, momenta: Momenta) -> Iterator[tuple[_HalfPeriod, _Motion]]:
-        """Follow the momenta of heavy parts against the centre of mass of all parts that move."""
+        """Follow the momenta of heavy parts relative to the centre of mass of all moving parts."""
         masses = momenta.masses
         assert masses is not None
         for states, moving, complete in self._evidence.alike(momenta.time.size):
@@ -298,7 +298,7 @@ class InnerMotion:
         return self._going_on[number, axis]
 
     def _follow_energy(self, states: History) -> Iterator[_HalfPeriod]:
-        """Follow the internal energy, which swings twice as often as what deforms."""
+        """Follow the internal energy, which oscillates at twice the rate of the deformation."""
         if not states.time.size:
             return
         energies = np.maximum.accumulate(np.abs(states.energy))
@@ -307,7 +307,7 @@ class InnerMotion:
         yield from self._energy.add(states.time, states.energy, _AT_REST * largest)
 
     def _learn(self, swing: _HalfPeriod, motion: _Motion) -> None:
-        """Lengthen the wait by a swing that is over, unless it was a rotation or a push disturbed it.
+        """Lengthen the wait by a completed half period, unless it was a rotation or disturbed by a push.
 
         A pushed swing counts if there is no deck and this motion has not swung without a push before.
         """
@@ -340,7 +340,7 @@ class InnerMotion:
         so_far.append(longest)
 
     def needed(self, start: float, now: float) -> float | None:
-        """Return the wait for a flight since ``start``, by the states up to ``now`` [time]; None while it is unknown.
+        """Return the wait for a flight since ``start``, from the states up to ``now`` [time]; None if unknown.
 
         Raises
         ------
@@ -351,7 +351,7 @@ class InnerMotion:
         return wait.time if wait else None
 
     def wait(self, start: float, now: float) -> Wait | None:
-        """Return the wait as `needed`, with its reason."""
+        """Return the wait of `needed` with its reason."""
         at_rest = self._is_at_rest(start, now)
         if self._given is None and at_rest:
             time = self._evidence.history.time
@@ -370,23 +370,23 @@ class InnerMotion:
         return Wait(self._given, "given", "as given")
 
     def longest(self, now: float) -> Wait | None:
-        """Return half of the longest period that is known ``now``, from the deck or the record so far."""
+        """Return the longest half period known ``now``, from the deck or from the record so far."""
         longest = self._get_longest(now)
         if longest is None or longest.half <= (
             self._least.time if self._least else 0.0
         ):
             return self._least
-        reason = f"{longest.name} took {longest.half:.3g} for half a period that was over at {longest.over:.6g}"
+        reason = f"{longest.name} took {longest.half:.3g} for half a period, until {longest.over:.6g}"
         return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
-        """Return half of the longest swing that is known ``now``, even if a push lengthened it [time]."""
+        """Return the longest half period known ``now``, also if a push lengthened it [time]."""
         longest = self._get_longest(now)
         of_record = longest.swing if longest else 0.0
         return max(of_record, self._least.time if self._least else 0.0)
 
     def _get_longest(self, now: float) -> _Longest | None:
-        """Return what was known at a time: from the parts, or from the energy as long as no part moves."""
+        """Return what was known at a time: from the parts, or from the energy while no part moves."""
         has_parts = any(motion.begins <= now for motion in self._part_motions)
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         count = bisect_right(so_far, now, key=lambda longest: longest.since)
@@ -406,7 +406,7 @@ class InnerMotion:
         return largest[0] <= _ROUND_OFF * max(largest)
 
     def _has_long_ongoing_swing(self, now: float) -> bool:
-        """Return True if a swing goes on that has taken much longer already than all swings before it."""
+        """Return True if an unfinished oscillation is much longer already than all before it."""
         longest = self._get_longest(now)
         strongest = longest.strength if longest else 0.0
         motions = [
@@ -441,8 +441,8 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
     shortest = longest.time if longest.least is None else longest.least
     if shortest and given < _EXACT * shortest:
         raise RangeError(
-            f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a period that is known: {longest.reason}; "
-            "a gap in the load would pass for flight"
+            f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a known period: {longest.reason}; a gap in the "
+            "load would be treated as flight, so give a longer one"
         )
 
 

@@ -1,4 +1,4 @@
-"""Read the files of a run again and again while it is computed, and give the new states.
+"""Read the files of a run repeatedly while it is computed, and return the new states.
 
 Of the histories of solvers only the last states are read again.  Files of other formats are read as a whole each time.
 """
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-# A record with fewer states is read as a whole: what follows from all states, as which parts are springs, may change.
+# A record with fewer states is read completely, since early results may change, such as which parts are springs.
 _FEWEST_STATES: Final = 200
 
 
 class Looks:
-    """Reads the same run again and again, with the same ``selection`` and deck."""
+    """Reads the same run repeatedly, with the same ``selection`` and deck."""
 
     def __init__(
         self, selection: Selection, inventory: Inventory | None = None
@@ -46,7 +46,7 @@ class Looks:
         return bool(self._resume_points)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Read the new states, and whether they follow the states that were read before.
+        """Read the new states, and report whether they follow those read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -58,7 +58,7 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            self._resume_points, self._last_states = {}, []  # a file is gone
+            self._resume_points, self._last_states = {}, []  # the file no longer exists
         history = self._read_on(names)
         new_states = None
         if history is not None:
@@ -83,7 +83,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, those that were known among them, and the whole of new files.
+        """Read the last states of each file, including the known ones, and all of new files.
 
         Files without a point, as those with forces only, are not read again.  Return None if a file cannot be read from
         its point, as when it was written anew.
@@ -109,7 +109,7 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in some files, without a last state that is not whole, and where to read on in them.
+        """Return the history in the files without an incomplete last state, and where to continue in them.
 
         The places are {} if the format of a file is always read as a whole.
         """
@@ -125,7 +125,7 @@ class Looks:
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
-    """Return where to read on in the files of a run; {} if the format of one is always read as a whole."""
+    """Return where to continue in the files of a run; {} if one format is always read completely."""
     points: dict[str, ResumePoint] = {}
     for database in run.databases:
         points_of_format = database.find_resume_points()
@@ -136,7 +136,7 @@ def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
 
 
 def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:
-    """Return a file without a last state that lacks some of its lines."""
+    """Return a file without an incomplete last state."""
     point = points.get(source.name)
     if point is None or point.end == len(source.data):
         return source

@@ -1,4 +1,4 @@
-"""The record of a run that is being computed: every look appends states to it."""
+"""Keep the record of a run that is being computed, to which each read appends states."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Rows for which a column has room from the start.
+# Initial number of rows of a column.
 _FEWEST_ROWS: Final = 64
 # States that are so many printed digits apart do not get the same time.
 _APART: Final = 1.5
@@ -28,7 +28,7 @@ _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array that grows by rows and is copied only when its room doubles."""
+    """An array that grows by rows and is copied only when its capacity doubles."""
 
     def __init__(self) -> None:
         self._room: NDArray[Any] = np.empty(0)
@@ -52,7 +52,7 @@ class GrowingColumn:
 
 
 class GrowingRecord:
-    """All states of a run so far, as columns of three kinds of tables: the history, its momenta and its balance."""
+    """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 
     def __init__(self) -> None:
         self._latest_tables: list[Table] = []
@@ -75,7 +75,7 @@ class GrowingRecord:
 
     @property
     def history(self) -> History:
-        """All states as one history; there must be some."""
+        """All states as one history; at least one state must exist."""
         if self._history is None:
             tables: list[Any] = []
             for table, columns in zip(self._latest_tables, self._columns, strict=True):
@@ -129,7 +129,7 @@ def _drop_unsettled(table: Table, precision: Precision) -> Table:
 
 
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; where it has none, that of the tables ``before``."""
+    """Return the last state of each table of a history; for an empty table that of the tables ``before``."""
     tables = list_tables(history)
     last_states: list[Any] = []
     for number, table in enumerate(tables):
@@ -141,7 +141,7 @@ def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
 
 
 def skip_states(history: History, last_states: Sequence[Table]) -> History | None:
-    """Return the states of a history after the last ones that were known; None if it does not hold these.
+    """Return the states of a history after the known last ones; None if it does not contain these.
 
     ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
     """

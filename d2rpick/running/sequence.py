@@ -1,4 +1,4 @@
-"""Choose the next leg of a first run that switches itself, from what the legs so far have shown.
+"""Choose the next leg of a first run that switches itself, from the results of the legs so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
 machine is.  A leg that replaces a discarded one gets its number.
@@ -18,25 +18,27 @@ if TYPE_CHECKING:
 # Kinds of legs: deformable; rigid, in which the flight may end; rigid, computed again up to the td now known.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Two times are the same if they differ by less than so many states: the history of a leg may end one state early.
+# Two times are equal if they differ by less than this number of states: a history may end one state early.
 _STATES: Final = 1.5
-# The solver numbers legs from 1 to 99.  With 10 left, no further flight is switched: the run must reach its end.
+# The solver numbers legs from 1 to 99. With 10 left no further flight is switched, so that the run reaches its end.
 _MOST_LEGS, _KEPT_BACK = 99, 10
 # Shortest deformable leg in a flight, as a share of the wait: one of its two ends has the higher energy.
 _LEAST: Final = 0.25
-# Length of a deformable leg while no wait is known, as a share of the run.
+# Length of a deformable leg while the wait is unknown, as a share of the run.
 _UNKNOWN: Final = 0.02
-# Length of a probe: at least these shares of its rigid time so far and of the run.  A longer probe computes more after
-# the contact, a shorter one needs more restarts; each costs a few percent of a deformable flight.
+# Smallest length of a probe, as shares of its rigid time so far and of the run.
+# A longer probe computes more after the contact, a shorter one needs more restarts.
+# Each of them costs a few percent of a deformable flight.
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
 # Cost of writing and reading a restart, in deformable cycles (about 5 were measured).
 _RESTART: Final = 10
-# Shortest flight that is switched, in half swings of its slowest vibration.  A vibrating body touches the ground at
-# another time than a frozen one.  Rigid after flights of 2.4 and 2.8 half swings, two soft boxes landed 33 and 55 ms
-# late; after 3.2 and more, cars and boxes landed within 3.4 ms.
+# Shortest flight that is switched, in half periods of its slowest vibration.
+# A vibrating body touches the ground at another time than a frozen one.
+# After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 and 55 ms late.
+# After flights of 3.2 half periods and more, cars and boxes landed within 3.4 ms.
 _SWINGS: Final = 3.0
-# Least share of a deformable run that a window must save.  A window moves its own landing by up to 2 ms and the landing
-# after that by up to 37 ms (two computed boxes), which a smaller saving is not worth.
+# Smallest share of a deformable run that a window must save.
+# A window moves its own landing by up to 2 ms and the next one by up to 37 ms (two computed boxes).
 _WORTH: Final = 0.04
 
 
@@ -67,11 +69,11 @@ class Limits(NamedTuple):
 
     @property
     def same(self) -> float:
-        """Two times that differ by less are the same [time]."""
+        """Times that differ by less are equal [time]."""
         return _STATES * self.interval
 
     def until_end(self, until: float) -> float:
-        """Return ``until``, or the end of the run if that is as near as makes no difference [time]."""
+        """Return ``until``, or the end of the run if that is close enough [time]."""
         return until if until < self.end - self.same else self.end
 
 
@@ -93,12 +95,12 @@ class Order(NamedTuple):
         return self.kind in RIGID_KINDS
 
     def following(self, kind: str, until: float) -> Order:
-        """Return the order of a leg that goes on from the end of this one."""
+        """Return the order of a leg that continues from the end of this one."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
 class LegFindings(NamedTuple):
-    """What the record shows up to the end of a leg.
+    """Results of the record up to the end of a leg.
 
     Attributes
     ----------
@@ -140,7 +142,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed leg, with its ``cycles`` and processor time ``cpu`` [s], None if its listing does not contain them."""
+    """A computed leg, with its ``cycles`` and CPU time ``cpu`` [s], None if its listing does not contain them."""
 
     order: Order
     findings: LegFindings
@@ -154,12 +156,12 @@ class Leg(NamedTuple):
 
     @property
     def length(self) -> float:
-        """How long the leg is [time]."""
+        """Duration of the leg [time]."""
         return self.order.until - self.order.start
 
 
 class Window(NamedTuple):
-    """A flight that was switched at ``tr`` and ``td``, or was left deformable for a ``reason``.
+    """A flight that was switched at ``tr`` and ``td``, or left deformable for a ``reason``.
 
     ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
     """
@@ -180,7 +182,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     D2RPickError
         If the solver has no number for one more leg.
     """
-    if not legs:  # so many states show that parts at rest fall
+    if not legs:  # this number of states shows that parts at rest fall
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last = legs[-1].order
     if last.rigid and legs[-1].findings.contact is not None:
@@ -198,7 +200,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order = _follow_load(legs, limits)
     if order and order.number > _MOST_LEGS:
         raise D2RPickError(
-            f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`"
+            f"the run needs more than {_MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
         )
     return order
 
@@ -210,7 +212,7 @@ def _follow_window(last: Order, leg: Leg, limits: Limits) -> Order:
 
 
 def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order a probe if a flight was seen and can still pay, else one more deformable leg."""
+    """Order a probe if a flight was seen and can still pay off, else one more deformable leg."""
     last, findings = legs[-1].order, legs[-1].findings
     switches = (
         findings.flies
@@ -224,13 +226,13 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
         return last.following(
             PROBE, _determine_probe_end(legs, last.until, last.until, limits)
         )
-    # The energy was higher where the leg began: the probe replaces the leg.
+    # The energy was higher at the start of the leg, so the probe replaces the leg.
     until = _determine_probe_end(legs, last.start, last.start, limits)
     return last._replace(kind=PROBE, until=until)
 
 
 def _determine_load_end(leg: Leg, limits: Limits) -> float:
-    """Return when a deformable leg after this one ends: when a flight of now, or of before, has lasted for the wait."""
+    """Return the end of the next deformable leg: when a present or past flight has lasted for the wait."""
     now, findings = leg.order.until, leg.findings
     legs_left = _MOST_LEGS - _KEPT_BACK - leg.order.number
     if legs_left <= 0:
@@ -253,7 +255,7 @@ def _determine_load_end(leg: Leg, limits: Limits) -> float:
 def _determine_probe_end(
     legs: Sequence[Leg], tr: float, now: float, limits: Limits
 ) -> float:
-    """Return when a leg ends that begins ``now`` in a probe that began at ``tr``."""
+    """Return the end of a leg that begins ``now`` in a probe that began at ``tr``."""
     length = max(
         get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * (now - tr),
@@ -303,19 +305,19 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
         for order in collect_joined_legs(legs[-1].order, legs)
         if 0 <= td - order.until <= limits.same
     ]
-    td = max(leg_ends, default=td)  # no leg for less than two states
+    td = max(leg_ends, default=td)  # no leg of less than two states
     reason = _explain_too_little_saved(legs, td - tr, limits)
     if not findings.idle and flight < _SWINGS * findings.swing:
-        reason = f"shorter than {_SWINGS:g} half swings of {findings.swing:.3g}: its landing is not known"
+        reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
     return Window(findings.free, tr, td, contact, wait, reason)
 
 
 def _explain_too_little_saved(
     legs: Sequence[Leg], rigid_time: float, limits: Limits
 ) -> str | None:
-    """Say why a window does not pay for its probe and restarts; None if it does.
+    """Explain why a window does not pay for its probe and restarts; None if it does.
 
-    Cycles decide, since processor times differ each time and the same command must compute the same run.
+    Cycles decide, since CPU times differ each time and the same command must compute the same run.
     """
     if rigid_time <= 0:
         return "its margin begins before tr"
@@ -339,7 +341,7 @@ def _count_deformable_cycles(legs: Sequence[Leg]) -> float:
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Return the legs that lead up to a leg, and the leg, since the parts last became rigid or deformable."""
+    """Return the legs up to and including a leg since the parts last became rigid or deformable."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
     while (previous := latest.get(joined[0].number - 1)) and (

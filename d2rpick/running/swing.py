@@ -1,4 +1,4 @@
-"""Warn, before td is known, of parts that swing too much for their body to become rigid."""
+"""Warn, before td is known, about parts that oscillate too much for their body to become rigid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Swing(NamedTuple):
-    """A part that swings against the others: its ``name``, and by how much that may displace the body [length].
+    """An oscillating part: its ``name``, and the largest displacement of the body by it [length].
 
     In a flight shorter than ``flight`` [time] the ``error`` is more than 1 % of the path, which is too much.
     ``at_most``: both parts may turn instead, which displaces nothing.
@@ -29,18 +29,18 @@ class Swing(NamedTuple):
 
     @property
     def told(self) -> str:
-        """What the user should know before the body becomes rigid."""
-        motion, limit = "still swings against the others", "about"
+        """Sentence for the user before the body becomes rigid."""
+        motion, limit = "still moves relative to the others", "about"
         if self.at_most:
-            motion, limit = "swings against the other, or both turn", "at most"
+            motion, limit = "moves relative to the other, or both rotate", "at most"
         return (
-            f"{self.name} {motion}: at td the body may be off by {limit} {self.error:.3g},"
+            f"{self.name} {motion}: at td the body may be out of place by {limit} {self.error:.3g},"
             f" more than {MOST_OF_PATH:.0%} of its path in a flight shorter than {self.flight:.3g}"
         )
 
 
 def find_swing(history: History, start: float, tr: float) -> Swing | None:
-    """Find by how much a swinging part may displace the body that becomes rigid at ``tr``, in a flight since ``start``.
+    """Find the largest displacement of a body by an oscillating part if it becomes rigid at ``tr``.
 
     td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
     if the momenta of parts are not enough to tell.
@@ -58,7 +58,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
 
 
 def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | None:
-    """Return the upper limit that follows from the momenta of two parts alone; None if other parts move too."""
+    """Return the upper limit from the momenta of two parts alone; None if other parts move too."""
     inside = find_window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
     if momenta.parts is None or masses is None or time.size < 2:
@@ -83,7 +83,7 @@ def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | Non
 def _make_swing(
     name: str, error: float, path: float, duration: float, *, at_most: bool = False
 ) -> Swing | None:
-    """Return the swing of a part, by the path of the body in a flight so far [length, time]; None without a path."""
+    """Return the oscillation of a part with the path of the body in a flight so far; None without a path."""
     if path <= 0:
         return None
     return Swing(name, error, error / path / MOST_OF_PATH * duration, at_most)

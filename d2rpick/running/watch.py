@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.running.events import Decided
 
-# Share of a core that looks may take.
+# Share of a processor core that reading may take.
 _SHARE: Final = 0.01
-# Shortest pause between two looks, and the longest one if only new states are read [s].
+# Shortest pause between two reads, and longest one if only new states are read [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
-# A run that writes nothing for so long is silent [s].
+# A run that writes nothing for this time is silent [s].
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
-    "neither a momentum nor the energy of contacts is written: nothing tells when a force acts; let the run write them "
+    "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
 )
 
@@ -59,7 +59,7 @@ class Watch:
         self._looks = Looks(selection, inventory)
         self._begin_again()
         self._files: list[tuple[str, os.stat_result]] = []
-        self._events: tuple[Event, ...] = ()  # reported so far
+        self._events: tuple[Event, ...] = ()  # events reported so far
         self._error: FormatError | HistoryError | None = None
         self._last_time = float("-inf")
         self._report_silence_after = _SILENT
@@ -73,7 +73,7 @@ class Watch:
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
-        """Give the events since the last look; none of a run that has not begun.
+        """Return the events since the last read; none for a run that has not begun.
 
         Raises
         ------
@@ -103,13 +103,13 @@ class Watch:
 
     @property
     def reads_what_is_new(self) -> bool:
-        """Return True if the next look reads only the new states."""
+        """Return True if the next read covers the new states only."""
         return self._looks.grow
 
     def state(self) -> Event:
         """Return whether the parts fly now, and since when."""
         if not self._events and self._last_time == float("-inf"):
-            message = "has not begun"
+            message = "no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
@@ -124,11 +124,13 @@ class Watch:
             f"no flight since {events[-1].time:.6g}" if events else "no flight yet"
         )
         if self._wait_unknown:
-            message += "; nothing tells how long no force must act to count as flight: give `wait`"
+            message += (
+                "; the force-free time that marks a flight is unknown: give `wait`"
+            )
         return self._make_event("state", message)
 
     def _read(self, names: Sequence[str], *, rewritten: bool) -> Iterator[Event]:
-        """Read the new states and give their events."""
+        """Read the new states and return their events."""
         if not names:
             return
         states, follows = self._looks.new_states(names)
@@ -146,7 +148,7 @@ class Watch:
         events = find_events(self._evidence, self._motion, self._decided)
         reported = self._events
         if self._last_time == float("-inf"):
-            message = f"the run has come to {now:.6g}"
+            message = f"the run has reached {now:.6g}"
             yield Event("begun", float(time[0]), now, message)
         elif rewritten or now < self._last_time:
             pairs = zip(reported, events, strict=False)
@@ -164,15 +166,13 @@ class Watch:
             yield self._make_event(event, f"the run has ended {self.ended}")
 
     def _report_restart(self, kept_count: int, now: float) -> Iterator[Event]:
-        """Report that a run went back, and when the contact is expected that it had after ``now`` before."""
-        message = f"the run was restarted: it was at {self._last_time:.6g}, and is at {now:.6g}"
+        """Report that a run went back, and when to expect the contact that came after ``now`` before."""
+        message = f"the run was restarted: it was at {self._last_time:.6g} and is now at {now:.6g}"
         yield Event("restart", now, now, message)
         for event in self._events[kept_count:]:
             if event.event == "contact":
                 if event.time is not None and event.time > now:
-                    message = (
-                        "a contact is expected there: before the restart it came there"
-                    )
+                    message = "a contact is expected there, as before the restart"
                     yield Event("expected", event.time, now, message)
                 return
 
@@ -182,7 +182,7 @@ class Watch:
         return Event(event, None if event == "state" else now, now, message)
 
     def _measure_silence(self) -> float:
-        """Return for how long nothing was written to the files [s]."""
+        """Return the time for which the files did not change [s]."""
         now = time.time()
         written = max((status.st_mtime for _, status in self._files), default=now)
         return max(0.0, now - written)
@@ -192,7 +192,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[Event]:  # fmt: skip
-    """Give the events of a run until it has ended, or for ``lasting`` [s]; the other arguments are those of `Watch`."""
+    """Yield the events of a run until it has ended, or for ``lasting`` [s]; other arguments as for `Watch`."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
@@ -200,7 +200,7 @@ def follow(
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
         if watch.reads_what_is_new:
-            pause = min(pause, _LONGEST)  # only the first look reads everything
+            pause = min(pause, _LONGEST)  # only the first read covers everything
         remaining = end - time.monotonic()
         if remaining <= 0 or (watch.ended and lasting is None):
             yield watch.state()
@@ -217,7 +217,7 @@ def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
             raise
         return
     for path in (*paths, *find_later_legs(paths)):
-        with suppress(OSError):  # not there yet, or no longer
+        with suppress(OSError):  # missing so far, or no longer there
             status = Path(path).stat()
             if status.st_size:
                 yield path, status
@@ -226,7 +226,7 @@ def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
 def _list_stamps(
     files: Sequence[tuple[str, os.stat_result]],
 ) -> list[tuple[str, int, int, int]]:
-    """Return what changes when a file is written."""
+    """Return the properties of each file that a write changes."""
     return [
         (name, status.st_ino, status.st_size, status.st_mtime_ns)
         for name, status in files

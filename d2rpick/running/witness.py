@@ -1,4 +1,4 @@
-"""Find for each state since when no force has acted on given parts or the model, from the states up to it.
+"""Find, for each state, the time without force on given parts or the model, from the states up to it.
 
 From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
 momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
 
-    # Returns the wait for a flight from ``start``, by the states up to ``now``: (start, now) [time]; None if unknown.
+    # Function that returns the wait for a flight from ``start``, from the states up to ``now`` [time]; None if unknown.
     Needed = Callable[[float, float], float | None]
 
-# Tolerance of a constant momentum or contact energy, as a share of its largest value so far: single precision adds up
-# to a tenth of it.
+# Tolerance of a constant momentum or contact energy, as a share of its largest value so far.
+# Sums in single precision have errors of 1/10 of it.
 CONSTANT: Final = 1e-4
-# After a force that was not gravity, the next test waits for this share of the time without force so far.
+# After a force other than gravity, the next test waits for this share of the force-free time so far.
 _TEST_AGAIN: Final = 0.25
-# Of a longer stretch, so many states are compared with the law: a force changes the momentum for good.
+# Most states of a long interval that are compared with the law: a force changes the momentum permanently.
 _MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """A flight: a time without force that lasted for its wait.
+    """A flight: a force-free time that lasted for its wait.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Quiet(NamedTuple):
 
 
 class _SampledFall(FreeFall):
-    """The law of free fall, compared with only some states of a long window."""
+    """The law of free fall, compared with a sample of the states of a long window."""
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         if last - first <= _MOST_COMPARED:
@@ -90,7 +90,7 @@ class _SampledFall(FreeFall):
 
 
 class GrowingWitness:
-    """Tells at each of its states since when no force has acted on some parts, or on the whole model.
+    """Finds at each of its states the force-free time of given parts, or of the whole model.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class GrowingWitness:
         self.members, self.parts, self.origin = members, parts, origin
         self.free: list[int] = []
         self.flights: list[Quiet] = []
-        # For each state, whether the written digits are enough to show a force.
+        # For each state, True if the written digits are sufficient to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         names = ("time", "momentum", "contact", "alone")
         self._columns = {name: GrowingColumn() for name in names}
@@ -122,7 +122,7 @@ class GrowingWitness:
         return self._columns["time"].rows
 
     def add(self, **rows: NDArray[Any] | None) -> None:
-        """Append states: time, momentum (k, 3), contact energy (k,); ``alone``: whether all other parts are at rest."""
+        """Append states: time, momentum (k, 3), contact energy (k,); ``alone`` if all other parts are at rest."""
         for name, values in rows.items():
             if values is not None:
                 self._columns[name].add(values)
@@ -130,7 +130,7 @@ class GrowingWitness:
     def follow(
         self, momentum_precision: Precision, contact_precision: Precision
     ) -> None:
-        """Find for each new state since when no force has acted, with the precisions of what is written."""
+        """Find the force-free time at each new state, with the precisions of the written values."""
         self._laws: list[tuple[Law, Samples]] = []
         contact = self._columns["contact"].rows
         momentum = self._columns["momentum"].rows
@@ -138,8 +138,8 @@ class GrowingWitness:
             tolerance, self._shows_forces = _set_tolerance(
                 np.abs(contact), contact_precision
             )
-            # Contact energy shows bodies that hit each other, which keep their momentum.  Once other parts move, it
-            # shows their contacts too and is no longer used.
+            # Contact energy shows collisions between bodies, which do not change the total momentum.
+            # Once other parts move, it shows their contacts too and is no longer used.
             alone = self._columns["alone"].rows
             law = Constant(self.time, contact[:, np.newaxis])
             self._laws.append((law, np.where(alone, tolerance, np.inf)))
@@ -155,20 +155,20 @@ class GrowingWitness:
             self.free.append(first)
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the change between two states that no law explains over its tolerance; above 1 a force acts [-]."""
+        """Return the unexplained change between two states relative to its tolerance; above 1 a force acts [-]."""
         return max(
             law.misfit(first, last) / float(tolerance[last])
             for law, tolerance in self._laws
         )
 
     def last_without(self, first: int) -> int:
-        """Return the last state before a force appears, counting from ``first``."""
+        """Return the last state before a force appears, starting from ``first``."""
         return find_farthest(
             first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
         )
 
     def _find_first_without_force(self, last: int, first: int) -> int:
-        """Return the first state, ``first`` or later, from which no force shows up to ``last``.
+        """Return the first state at or after ``first`` without a visible force up to ``last``.
 
         Steps double, so that the search takes few tests whether the state is near or far; a bisection ends it.
         """
@@ -192,7 +192,7 @@ class GrowingWitness:
         needed: Needed,
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
-        """Add the flights that begin in the new states, and the ends of those that end in them.
+        """Add the flights that begin in the new states, and the ends of flights.
 
         ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
         """
@@ -216,7 +216,7 @@ class GrowingWitness:
         self._tested_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: float, gravity: float | None) -> None:
-        """Add a flight since ``first`` that is seen at a state; without ``gravity``, set when to test again."""
+        """Add a flight since ``first`` that is seen at a state; without ``gravity``, set the time of the next test."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return
@@ -235,7 +235,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is as high as at ``first`` again [time]; None if before ``last``."""
+        """Return when the centre of mass is again as high as at ``first`` [time]; None if before ``last``."""
         begin, end = self._columns["momentum"].rows[[first, last]]
         gained = end - begin
         duration = float(self.time[last] - self.time[first])

@@ -1,4 +1,4 @@
-"""Find what vibrates, and how: the models of the vibration, best first.
+"""Identify the vibration: find the models that describe it, best first.
 
 Every measure of a pair (tr, td) needs the deformations at both times and how they lie to each other (`measures`).  The
 energy does not show the sign of a deformation, so a model must.  `find_part_signs`, `span` and `find_models` look for
@@ -41,9 +41,12 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
+# Models by name, best first.
+MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
+
 
 class VibratingTogether(Protocol):
-    """What vibrates together in a flight."""
+    """The chosen parts and all parts that vibrate with them in a flight."""
 
     @property
     def complete(self) -> bool:
@@ -51,14 +54,11 @@ class VibratingTogether(Protocol):
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return its kinetic energy in the flight less that of the fall: times and energies (n,), None if unknown."""
+        """Return times and kinetic energies of the vibration in the flight, without the fall (n,); None if unknown."""
 
 
 if TYPE_CHECKING:
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-
-# Models by name, best first.
-MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
 
 
 def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
@@ -135,7 +135,7 @@ def _find_swings(history: History, first: float, last: float) -> Swings | None:
 
 
 def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Rely on vague or doubtful modes, with a wide band, only if no other model tells the sign."""
+    """Use vague or doubtful modes, with a wide band, only if no other model gives the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:
         return found

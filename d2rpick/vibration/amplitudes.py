@@ -1,4 +1,4 @@
-"""Compute what follows from the signed amplitudes of modes or parts alone."""
+"""Compute all quantities that follow from the signed amplitudes of modes or parts."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class SignedAmplitudes:
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the sum over q(tr) q(td), of the shape of ``tr``; ``td`` is one for all, or one for each [energy]."""
+        """Return the sum of q(tr) q(td), of the shape of ``tr``; ``td`` is a number, or one for each tr [energy]."""
         return np.asarray(
             np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr))
         )
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the sum of the squares of q(tr) - q(td), of the shape of ``tr`` [energy]."""
+        """Return the sum of squared differences q(tr) - q(td), of the shape of ``tr`` [energy]."""
         return np.asarray(np.sum(self.differences(tr, td) ** 2, axis=0))
 
     def differences(self, tr: Samples | float, td: Samples | float) -> Samples:

@@ -1,4 +1,4 @@
-"""Fit the energy of one vibration mode to samples by least squares, without a given first guess.
+"""Fit the energy of one vibration mode to samples by least squares, without an initial guess from outside.
 
 Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
 vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
@@ -32,32 +32,28 @@ if TYPE_CHECKING:
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
-# Matrix pencil: numbers of exponentials in q**2, the lags, cells and rates that are tried.
+# Matrix pencil: the tried numbers of exponentials in q**2, lags, cells and rates.
 _ORDERS: Final = (
     3,
     4,
     6,
-)  # exponentials in q**2: of a vibration, with plastic work, and with a preload
+)  # exponentials in q**2 of a plain vibration, with plastic work, and with a preload
 _LAGS: Final = 64  # 1/3 of the fewest cells, the optimum against noise
 _MIN_CELLS: Final = 192
 _MAX_CELLS: Final = 8192  # limits memory to 5 MB; enough for 1000 periods of the energy
 _CELLS_PER_PERIOD: Final = 24  # fewest cells per period of the strongest vibration in E; a preload adds a slower one
 
 # Limits of the least-squares fit.
-COARSE: Final = 400  # samples on which starts are compared and first refined
+COARSE: Final = 400  # number of samples for comparing and first refining the starts
 _MEDIUM: Final = (
-    2048  # samples on which a fit may be refused before it is refined on more
+    2048  # number of samples on which a fit may be refused before all samples are used
 )
-_NEAR: Final = (
-    1e-6  # relative gain at which a refusal is decided: negligible beside the structure
-)
-MAX_MISFIT: Final = (
-    0.4  # largest rest over std(E): 16 % of the variance or more can hide another mode
-)
+_NEAR: Final = 1e-6  # relative gain below which a refusal is decided: negligible beside the structure
+MAX_MISFIT: Final = 0.4  # largest rms misfit over std(E): 16 % of the variance or more can hide another mode
 _FAR_TOO_MUCH: Final = (
     1.2  # safety factor: the variance of 2,000 samples is known to 3 %
 )
-STARTS: Final = 3  # most starts refined: with noise the first in rank may not end best
+STARTS: Final = 3  # most starts to refine: with noise the first one may not end best
 CERTAIN: Final = (
     0.01  # unexplained share of the variance below which no second start is tried
 )
@@ -66,22 +62,22 @@ _MAX_STEPS: Final = 40
 # reached a third of a period, or followed the samples any better, when it was refined for all of them.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
-# A parameter whose derivatives are smaller, for energies of about 1, has no effect; squares below it underflow.
+# A parameter with smaller derivatives, for energies of about 1, has no effect; their squares underflow.
 _NO_EFFECT: Final = 1e-100
 MAX_STRUCTURE: Final = (
     0.02  # share of std(E), 30 times what one real solver leaves with one mode
 )
-# Standard deviations of white noise's covariance beyond which a rest has structure, and is surely structured.
+# A misfit has structure if its covariance is this many standard deviations above white noise, and clear structure
 _DEVIATIONS: Final = 3.0
 _BEYOND_DOUBT: Final = 6.0
-# Samples farther apart may share more of a slow structure than neighbours, at most twice its variance.
+# Standard deviations above white noise beyond which a misfit has structure, and beyond which this is certain.
 _BEYOND_STRUCTURE: Final = 2.0
 
 
 def fit_few(
     poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float
 ) -> Samples | None:
-    """Return the least-squares parameters for a few of the samples, the first ``size`` of them free, the others zero.
+    """Return least-squares parameters for a selection of samples: the first ``size`` are free, the others zero.
 
     None if the fit leaves more than ``worst`` of the variance or, if ``worst`` is finite, too much structure.
     """
@@ -103,7 +99,7 @@ def fit(
     best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
-    if best[5] < 0:  # q and -q have the same energy; the preload is made positive
+    if best[5] < 0:  # q and -q have the same energy, so the preload is made positive
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
@@ -117,7 +113,7 @@ def fit_all(
     e: Samples,
     worst: float,
 ) -> Samples | None:
-    """Return the best fit to all samples, starting from the ``best`` one to a few of them.
+    """Return the best fit to all samples, started from the ``best`` fit to a selection of them.
 
     None without a start, or if ``worst`` is finite and some of the samples are left with too much structure.  A fit
     that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
@@ -142,7 +138,7 @@ def _is_drift(parameters: Samples) -> bool:
 
 
 def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
-    """Return ``most`` of the samples, evenly spaced; by default those on which starts are compared."""
+    """Return ``most`` evenly spaced samples; by default as many as for comparing starts."""
     stride = -(-s.size // most)
     return s[::stride], e[::stride]
 
@@ -150,7 +146,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Return the best of the refined starts; None if all leave more than ``worst`` of the variance."""
+    """Return the best of the refined starts; None if each leaves more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance
@@ -164,7 +160,7 @@ def refine(
 
 
 def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Return True if the rest of the best fit to evenly spaced samples refuses the fit to all of them."""
+    """Return True if the misfit on evenly spaced samples is enough to refuse the fit to all samples."""
     return has_clear_structure(e - model(parameters, s)[0], float(np.std(e)))
 
 
@@ -181,13 +177,13 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Compute the vectors, those with the largest share of E first."""
+        """Compute the singular vectors, those with the largest share of E first."""
         running = integrate_by_trapezia(s, e)
         fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
         periods = int(
             np.argmax(power * np.arange(power.size))
-        )  # per octave, so that decay alone does not win
+        )  # per octave, so that a decay alone is not preferred
         count = min(
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
@@ -268,7 +264,7 @@ def _find_starts(
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
-        # two starts within half a radian over the record lie in the same valley
+        # two starts within half a radian over the record lead to the same minimum
         if all(
             abs(start[0] - start_before[0]) > 0.5
             or abs(start[1] - start_before[1]) > 0.5
@@ -278,7 +274,9 @@ def _find_starts(
     return best[:STARTS]
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a trial step too far is rejected
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # a trial step that is too large is rejected
 def refine_parameters(
     parameters: Samples,
     model: Model,
@@ -293,7 +291,9 @@ def refine_parameters(
     squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
     ``doomed``.
     """
-    damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
+    damping = (
+        1e-4  # relative to the unit diagonal: the starts are good, so steps may be long
+    )
     cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
     free = gradient.size
     for steps_left in range(_MAX_STEPS, 0, -1):
@@ -320,7 +320,7 @@ def refine_parameters(
 def _build_normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
-    """Return the sum of squares of the rest, J J^T and J rest, computed block by block."""
+    """Return the squared misfit, J J^T and J times the misfit, computed block by block."""
     cost = 0.0
     normal = np.zeros(())
     gradient = np.zeros(())
@@ -357,13 +357,13 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the root of the neighbours' covariance in ``rest`` beyond ``deviations`` of white noise.
+    """Return the root of the covariance of neighbours in ``rest`` above ``deviations`` of white noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """
 
     def excess(products: Samples) -> float:
-        """Return how far the mean of products exceeds what white noise allows."""
+        """Return how far a mean of products exceeds the limit for white noise."""
         return abs(float(np.sum(products))) - deviations * float(
             np.linalg.norm(products)
         )
@@ -373,7 +373,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
 
 def has_clear_structure(rest: Samples, spread: float) -> bool:
-    """Return True if the rest on evenly spaced samples shows that all samples leave too much structure.
+    """Return True if the misfit on evenly spaced samples shows too much structure for all samples.
 
     ``spread`` is the standard deviation of the energy there.
     """

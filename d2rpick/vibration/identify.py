@@ -1,4 +1,4 @@
-"""Identify the one vibration mode behind an internal energy history, or give the reason why there is none."""
+"""Identify the single vibration mode in an internal energy history, or give the reason why there is none."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import numpy as np
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.modes import Mode, compute_energy_and_jacobian
+from d2rpick.vibration.modes import (
+    SOLVER_FLOOR,
+    Mode,
+    compute_energy_and_jacobian,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,33 +23,28 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Thresholds of acceptance. White noise may be large, but a true model leaves no structure: the part of the misfit that
-# neighbouring samples share.
+# Thresholds of acceptance. White noise may be large, but a true model leaves no structure in the misfit.
+# Structure is the part of the misfit that neighbouring samples share.
 HOPELESS: Final = (
     0.5**2
 )  # unexplained share of the variance of 400 samples: six standard deviations beyond MAX_MISFIT
 MAX_LOCAL_STRUCTURE: Final = (
-    0.1  # share of the fit's energy at that time: a second mode that outlives the first
+    0.1  # share of the fitted energy at the same time: a second mode with less damping
 )
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
 MIN_SAMPLES_PER_PERIOD: Final = 10  # samples per energy period pi / omega: with fewer, an aliased fast mode looks slow
 MAX_GROWTH: Final = (
-    0.3  # -alpha x record length: noise hides no more growth of a free vibration
+    0.3  # -alpha x record length: noise hides at most this growth of a free vibration
 )
-MIN_PLASTIC: Final = (
-    -0.05
-)  # share of the energy range: plastic work is positive within the scatter of its fit
+MIN_PLASTIC: Final = -0.05  # share of the energy range: plastic work is positive except for the scatter of its fit
 MAX_OF_SPRING: Final = (
-    0.1  # misfit that a stiffening spring leaves to a vibration through zero
+    0.1  # misfit of a vibration through zero with a stiffening spring
 )
 _OF_A_PRELOAD: Final = (
-    0.03  # share of the vibration energy that raises a residual of 0.2 to 0.4
+    0.03  # share of the vibration energy that increases a residual of 0.2 to 0.4
 )
 
-# The rest is not compared with less vibration energy than this: a solver errs by 1e-5 of the maximum at any time.
-_FLOOR: Final = 1e-4  # of the highest vibration energy
-
-# Free parameters of the models, the simplest first, and the vibration periods needed to distinguish them.
+# Free parameters of the models, the simplest first, and the periods that are needed to distinguish the models.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -118,7 +117,7 @@ def identify(
     quick: bool = False,
     rates: NDArray[np.complex128] | None = None,
 ) -> Identification:
-    """Fit one vibration to E(t), else one over plastic work, else one about a preload, and judge the fit.
+    """Fit a vibration to E(t), else one with plastic work, else one with a preload, and judge the fit.
 
     Parameters
     ----------
@@ -165,7 +164,7 @@ def identify(
     )
     if (
         quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # others leave more than the richest model
+    ):  # all other fits leave a larger misfit than the richest model
         return _is_out_of_reach(time)
     fits = (
         (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
@@ -193,7 +192,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge fits with their least number of periods, the simplest first; else return the refused fit that is nearest.
+    """Judge fits with their fewest periods, the simplest first; else return the best refused fit.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
@@ -212,7 +211,7 @@ def _choose_first_to_follow(
 def _prefer_through_zero(
     found: Identification, simple: list[Identification]
 ) -> Identification:
-    """Give for a vibration that a preload keeps off zero the one of half its rate that passes zero, if it is near.
+    """Replace a vibration about a preload by one of half its rate that passes zero, if both fit almost alike.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
@@ -246,7 +245,7 @@ def _is_out_of_reach(time: Samples) -> Identification:
 def judge_given(
     mode: Mode, time: Samples, energy: Samples, *, quick: bool = False
 ) -> Identification:
-    """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
+    """Compare a given mode with a record: it must follow the samples as closely as a fit.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
     """
@@ -279,7 +278,7 @@ def judge_given(
 
 
 class _Record(NamedTuple):
-    """A record in units of its length and energy range, so that no unit system over- or underflows."""
+    """A record in units of its length and energy range, which avoids overflow and underflow in any unit system."""
 
     s: Samples
     e: Samples
@@ -299,14 +298,14 @@ class _Record(NamedTuple):
 
     @property
     def units(self) -> Samples:
-        """Return the units of the fit's parameters in those of the record."""
+        """Return the units of the fit parameters in the units of the record."""
         rate = 1 / (self.end - self.start)
         root = self.scale**0.5
         return np.array([rate, rate, root, root, self.scale, root])
 
 
 def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
-    """Return a refusal of a record that has too little for any judgement, else None."""
+    """Return a refusal of a record that is too short for a judgement, else None."""
     if time.size < MIN_SAMPLES:
         states_text = "1 state" if time.size == 1 else f"{time.size} states"
         return _refuse_without_fit(
@@ -315,7 +314,7 @@ def _refuse_short_record(time: Samples, energy: Samples) -> Identification | Non
         )
     if float(np.ptp(energy)) <= 1e-12 * float(
         np.max(np.abs(energy))
-    ):  # rounding of a constant
+    ):  # a constant with rounding errors
         return _refuse_without_fit(
             time, f"the energy is constant, {energy[0]:g}: nothing vibrates"
         )
@@ -356,9 +355,11 @@ def _judge_attempt(
     spread = float(np.std(e))
     structure = fitting.measure_structure(remainder)
     local = attempt.scaled.vibration_energy(s)
-    vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
-    # if noise exceeds the vibration, a rest does not show a further mode
-    np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
+    vibration = float(
+        np.hypot.reduce(local) / np.sqrt(s.size)
+    )  # the norm avoids the overflow of squares
+    # if noise exceeds the vibration, a misfit does not show a further mode
+    np.maximum(local, max(rms, SOLVER_FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))
     loose = _explain_misfit(rms / spread, structure / spread, local_structure)
     objection = _explain_implausible(
@@ -386,7 +387,7 @@ def _judge_attempt(
 def _explain_misfit(
     misfit: float, structure: float, local_structure: float
 ) -> str | None:
-    """Return the reason why the fit does not follow the samples, None if it does."""
+    """Return the reason why the fit does not follow the samples; None if it does."""
     if misfit > MAX_MISFIT:
         return f"one oscillator misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > fitting.MAX_STRUCTURE:
@@ -405,12 +406,12 @@ def _explain_misfit(
 
 
 def count_samples_per_period(time: Samples, mode: Mode) -> float:
-    """Return the number of samples per energy period of the fastest mode, in four digits.
+    """Return the number of samples per energy period of the fastest mode, with four digits.
 
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # mean interval that contains a moment of the record: gaps count by their length
+    # mean interval around a random time of the record: gaps are weighted by their length
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
@@ -418,7 +419,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
 def _explain_implausible(
     mode: Mode, density: float, least_periods: float, span: float
 ) -> str | None:
-    """Return the reason why a scaled fit that follows the samples is no evidence of one free vibration, else None."""
+    """Return the reason why a good fit is no evidence of a single free vibration; None if it is."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         finding = f"the record shows {periods:.3g} vibration periods"
@@ -430,7 +431,7 @@ def _explain_implausible(
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
-        # 10 % finer than the limit, so that rounding to two digits stays on the safe side
+        # 10 % finer than the limit, so that rounding to two digits is safe
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
         finding = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{finding}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
@@ -438,13 +439,13 @@ def _explain_implausible(
 
 
 def _make_mode(parameters: Samples, origin: float) -> Mode:
-    """Return the mode of some parameters."""
+    """Return the mode with the given parameters."""
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, origin, plastic, preload)
 
 
 def _refuse_without_fit(time: Samples, reason: str) -> Identification:
-    """Refuse a record to which nothing was fitted."""
+    """Return a refusal of a record to which nothing was fitted."""
     start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
     return Identification(
         None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))

@@ -1,4 +1,4 @@
-"""Find the lines of an energy: the decaying exponentials that it consists of, without a first guess.
+"""Find the spectral lines of an energy: its decaying exponentials, without an initial guess.
 
 The internal energy of a linear structure in free flight has one line for each mode, at twice the rate and twice the
 decay of the mode, above a mean that falls slowly.  The rates come from the shift invariance of the signal space
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     Complex = NDArray[np.complex128]
 
-# Numbers of exponentials that are tried: a line needs two of them, the mean one or a few.
+# Tried numbers of exponentials: each line needs two, the mean needs one or more.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# A higher order must reduce the prediction error by this factor, and below the second value none is tried.
+# A higher order must reduce the prediction error by this factor; below the second value no higher order is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
-# Longest window of the signal space [states], else half of the record: the cost grows with its square.
+# Longest window of the signal space [states], at most half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
 # States of the even grid in a period of the fastest relevant line, and the fewest and most states in all.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
@@ -47,9 +47,9 @@ _EARLY: Final = 0.25
 # A line swings at least once in the record, and decays by less than this share of its rate and by fewer powers of e
 # within the record than the third value.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
-# A free vibration does not grow; noise hides a growth up to this over the record.
+# A free vibration does not grow; noise hides a growth of this exponent over the record.
 _MOST_GROWTH: Final = 0.2
-# The mean is a constant and at most this many decays, which differ by this much over the record.
+# The mean is a constant plus at most this many decays, whose exponents over the record differ by the second value.
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -77,7 +77,7 @@ class Grid(NamedTuple):
         return float(self.time[-1] - self.time[0])
 
     def first(self, count: int) -> Grid:
-        """Return a grid of the first ``count`` blocks."""
+        """Return a grid with the first ``count`` blocks."""
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
     def waves(self, poles: Complex) -> Complex:
@@ -103,7 +103,7 @@ class Grid(NamedTuple):
 
 
 def make_even_grid(time: Samples, energy: Samples) -> Grid:
-    """Bring an energy to an even grid that keeps every line that matters.
+    """Bring an energy to an even grid that keeps all relevant lines.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
         from scipy.interpolate import (
             CubicSpline,
-        )  # not at the top: scipy costs start-up
+        )  # imported here: scipy makes the start slower
 
         values = CubicSpline(time, energy)(even)
     fastest, strongest = _count_turns(even, values)
@@ -177,12 +177,12 @@ class Exponentials(NamedTuple):
         )
 
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
-        """Return the waves that a mask selects."""
+        """Return the waves selected by a mask."""
         return Exponentials(self.poles[which], self.weights[which], self.origin)
 
 
 class Spectrum(NamedTuple):
-    """An energy as ``lines`` above a ``mean``, fitted to a grid; ``rest`` (m,) is the deviation [energy]."""
+    """An energy as ``lines`` and a ``mean``, fitted to a grid; ``rest`` (m,) is the misfit [energy]."""
 
     lines: Exponentials
     mean: Exponentials
@@ -190,11 +190,11 @@ class Spectrum(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Return the root mean square of the rest [energy]."""
+        """Return the rms misfit [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
-        """Return the lines of the internal energy that correspond to these lines of the kinetic energy.
+        """Return the lines of the internal energy that belong to these lines of the kinetic energy.
 
         With the damping ratio z and s = sqrt(1 - z^2), the weight of a line of T is -(s + i z)^2 times that of V.
         """
@@ -212,7 +212,7 @@ class Spectrum(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """The ``spectrum`` of a whole grid, that of its first part, and how well the first part predicts the rest.
+    """The ``spectrum`` of a grid, that of its first part, and the error of the prediction from the first part.
 
     ``missed`` is the root mean square deviation from the first part's spectrum, over the whole grid, relative to
     ``swing`` [-]; ``swing`` is the standard deviation of the energy about its trend [energy].
@@ -230,7 +230,7 @@ class Prediction(NamedTuple):
 
 
 def predict(grid: Grid) -> Prediction | None:
-    """Find the lines of an energy, as many as predict it best; None if it is too short or has no swing."""
+    """Find as many lines of an energy as predict it best; None if it is too short or does not oscillate."""
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None
@@ -274,7 +274,7 @@ def _get_needed(spectrum: Spectrum) -> float:
 
 
 class _SignalSpace:
-    """The space spanned by the windows of a record, directions with the largest share first."""
+    """The space spanned by the windows of a record, with the largest directions first."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
@@ -292,7 +292,7 @@ class _SignalSpace:
         return int(self.vectors.shape[1])
 
     def poles(self, order: int) -> Complex:
-        """Return the poles of ``order`` exponentials [1/time]: a shift by one state multiplies each by exp(p step)."""
+        """Return the poles of ``order`` exponentials [1/time], from the shift of the space by one state."""
         leading = self.vectors[:, :order]
         factors = np.linalg.eigvals(
             np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
@@ -304,7 +304,7 @@ class _SignalSpace:
 def fit_spectrum(
     grid: Grid, poles: Complex, span: float, *, every_decay: bool = False
 ) -> Spectrum:
-    """Fit lines and mean with these poles to a grid; poles are told apart by what they do within ``span`` [time].
+    """Fit lines and mean with the given poles to a grid; poles must differ within ``span`` [time].
 
     ``every_decay``: the mean has that of each line as it is, which noise allows of few lines alone.
     """
@@ -339,7 +339,7 @@ def _average_blocks(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
 def _split(
     poles: Complex, span: float, *, every_decay: bool
 ) -> tuple[Complex, Complex]:
-    """Separate the poles of lines from those of the mean: a constant, a few decays, and very slow swings."""
+    """Separate the poles of lines from those of the mean: a constant, decays, and very slow oscillations."""
     decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
     rate = poles.imag
     turns = rate * span / (2 * np.pi)
@@ -355,7 +355,7 @@ def _split(
 
 
 def _few_of(decays: Samples, span: float) -> Samples:
-    """Give a few decays that the record tells apart in place of many."""
+    """Replace many decays by a few that can be distinguished in the record."""
     rounded = sorted(set(np.round(decays * span, 1).tolist()))
     few = np.array([decay for decay in rounded if abs(decay) > _SAME_DECAY])
     if few.size > _MOST_DECAYS:

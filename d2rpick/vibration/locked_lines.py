@@ -1,4 +1,4 @@
-"""Find lines of an energy that are locked to other lines: lines of a stretch, and harmonics of a nonlinear spring."""
+"""Find lines of an energy that are locked to others: lines of a static stretch, and harmonics of nonlinear springs."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
-# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+# Smallest relevant line relative to the strongest line, the same relative to a partner line, and in units of scatter.
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record, and exactly one if they differ by
-# less than this angle, beside what scatter may add [rad].
+# Two rates are equal if they differ by less than this share of a turn over the record.
+# They are exactly equal if they differ by less than this angle [rad], beside what scatter may add.
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
-# Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
+# Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
 # is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
@@ -48,7 +48,7 @@ class StretchLine(NamedTuple):
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
 ) -> tuple[StretchLine, ...]:
-    """Find the lines of modes that vibrate about a stretch, as in a spinning body.
+    """Find the lines of modes that vibrate about a static stretch, as in a rotating body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
@@ -92,7 +92,7 @@ def find_stretches(
 def _find_side_lines(
     lines: Exponentials, span: float, scatter: float
 ) -> list[StretchLine]:
-    """Find the lines of modes about stretches that swing.
+    """Find the side lines of modes whose static stretch oscillates.
 
     A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
     their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
@@ -192,7 +192,7 @@ def measure_third_harmonic(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Return the size of lines at 3 and more times the rate of a line, with locked phases, relative to it [-].
+    """Return the relative size of phase-locked lines at 3 and more times the rate of a line [-].
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
@@ -215,7 +215,7 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Return the size of a line's harmonics beyond the second, up to the first one not locked, relative to it [-]."""
+    """Return the relative size of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))
@@ -231,7 +231,7 @@ def _measure_locked_to(
         if times > 2:
             if (
                 size[line] > size[first]
-            ):  # a harmonic is never stronger than its line: these are modes
+            ):  # a harmonic is never stronger than its line, so these lines are modes
                 return 0.0
             total += float(size[line] / size[first])
     return total
@@ -243,5 +243,5 @@ def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
 
 
 def _wrap(angle: float, turn: float) -> float:
-    """Return an angle within half a turn of zero [rad]."""
+    """Return an angle between minus and plus half a turn [rad]."""
     return (angle + turn / 2) % turn - turn / 2

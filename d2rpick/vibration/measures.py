@@ -1,4 +1,4 @@
-"""Compute what a pair (tr, td) costs: one function for each measure of the output.
+"""Compute the errors of a pair (tr, td), with one function for each measure of the output.
 
 A switched run keeps of the vibration only the deformation it had at tr, and starts at td with that deformation
 and no vibration velocity.  With q the deformation in units of the square root of energy (q^2 is the elastic
@@ -27,18 +27,18 @@ if TYPE_CHECKING:
 
     # Measures of n times by name, arrays of shape (n,); NaN if unknown.
     Columns = Mapping[str, Samples]
-    # Function that returns the stated, lowest and highest residual of each tr, from the residual of the deformations,
-    # tr and td [-].
+    # Function that returns the residual of each tr with its lower and upper bound [-].
+    # Its arguments are the residual of the deformations, tr, and td.
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
-# Growth of the lock-in error that ``timing_tolerance`` allows.
+# Increase of the frozen-deformation error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
-# By so many damping ratios R^2 depends on the phases at td, at most by two.
+# Factor of the damping ratio for the part of R^2 that depends on the phases at td; it is 2 at most.
 _PHASES_COUNT = 1.5
 
 
 class Deformation(Protocol):
-    """What the measures need: products of deformations at different times, and the energy of the vibration."""
+    """Interface of a vibration model: products of deformations at different times, and energies."""
 
     def elastic_energy(self, t: Samples | float) -> Samples:
         """Return the elastic energy of the deformation, of the shape of ``t`` [energy]."""
@@ -47,17 +47,17 @@ class Deformation(Protocol):
         """Return the product of the deformations at tr and td, of the shape of ``tr`` [energy]."""
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the elastic energy of the deformation at tr less that at td, of the shape of ``tr`` [energy]."""
+        """Return the elastic energy of the difference of the deformations at tr and td [energy]."""
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T [energy]."""
+        """Return the kinetic energy T of the vibration [energy]."""
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return V [energy]."""
+        """Return the energy V of the vibration [energy]."""
 
 
 class Measured(Record):
-    """Measures of one tr that need known deformations, each None if it is unknown.
+    """Measures of one tr that need known deformations; each is None if it is unknown.
 
     ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
     """
@@ -80,7 +80,7 @@ def measured(
     *,
     of_parts: bool,
 ) -> Columns:
-    """Return a column for each field of `Measured` for each tr (n,), for one ``td`` or one for each.
+    """Return a column for each field of `Measured`, for each tr (n,) and one ``td``, or one for each tr.
 
     If ``of_parts`` is True the deformations are those of parts, and the mismatch is relative to their energy at td.
     """
@@ -102,7 +102,7 @@ def measured(
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Place columns of `Measured` at their rows among ``size`` times, with NaN at the others."""
+    """Put columns of `Measured` into ``size`` rows at the given rows, with NaN in the others."""
     nothing = np.broadcast_to(np.nan, size)  # a broadcast array needs no memory
     spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
     for rows, columns in found:
@@ -112,12 +112,12 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 
 
 def compared(columns: Columns) -> NDArray[np.bool_]:
-    """Return for each time whether its deformation can be compared with that at td."""
+    """Return an array that is True if the deformation at a time can be compared with that at td."""
     return ~np.isnan(columns["sign_match"])
 
 
 def level_error(energy: Samples | float, level: Samples | float) -> Samples:
-    """|sqrt(E(tr)/E(td)) - 1| [-]: how far the locked-in amplitude is off, of the shape of ``energy``.
+    """Return |sqrt(E(tr)/E(td)) - 1| [-]: the relative amplitude error, of the shape of ``energy``.
 
     NaN where an energy, or the ``level`` at td, is not positive.
 
@@ -130,7 +130,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # beside a level of almost nothing any other energy is infinitely far off
+    ):  # compared with a level of almost zero, any other energy is infinitely wrong
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )
@@ -138,7 +138,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
 
 
 def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
-    """Return K = T(td)/V(td) [-]: the kinetic share of the vibration energy at td, which no tr can save.
+    """Return K = T(td)/V(td) [-]: the kinetic share of the vibration energy at td, which no tr preserves.
 
     Of the shape of ``td``.
 
@@ -180,7 +180,7 @@ def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Sample
 def sign_match(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> NDArray[np.bool_]:
-    """Return for each tr whether the deformations at tr and td point the same way, of the shape of ``tr``.
+    """Return an array that is True if the deformations at tr and td have the same direction.
 
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part with
     almost no deformation does not decide.
@@ -191,7 +191,7 @@ def sign_match(
 def band_about(
     squared: Samples, off: Samples, hidden: Samples | float, left_out: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
-    """Give a residual to state, and the lowest and the highest, from its square and by how much that may be off.
+    """Return a residual with its lower and upper bound, from its square and the error of the square.
 
     It may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No square is
     below zero: where it may reach there, the middle of what remains is stated.
@@ -203,7 +203,7 @@ def band_about(
 
 
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
-    """Share of R^2 that depends on where in its swing the error begins [-].
+    """Return the share of R^2 that depends on the phase of the error at td [-].
 
     Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
     after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.
@@ -259,7 +259,7 @@ def run_time_share(
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return how far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time]; td as for L.
+    """Return how far each tr (n,) may be off in both directions before L grows by 0.05 [time]; td as for L.
 
     That is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr by the
     tolerated growth; one period if q stays inside, since q has then passed all its values.
@@ -270,7 +270,7 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     )
     half = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # standstills between which q is monotone, on both sides of tr, in columns side by side
+    # times without velocity on both sides of tr, in columns: q is monotone between them
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
@@ -278,17 +278,17 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
 
 
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
-    """Return the distance from the first of some ``edges`` to where |q - wanted| exceeds ``room``; infinite if nowhere.
+    """Return the distance from the first of the ``edges`` to where |q - wanted| exceeds ``room``, else infinity.
 
     Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself is inside, whatever rounding gives
+    outside[0] = False  # tr itself is inside, regardless of rounding
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # beyond the band on the side where q leaves it
+    # beyond the band, on the side where q leaves it
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
@@ -306,14 +306,14 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
 def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
-    """Return times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
+    """Return times and values of the vertices of parabolas through the samples ``at`` and their neighbours."""
     step_before = time[at] - time[at - 1]
     step_after = time[at + 1] - time[at]
     fall = (values[at] - values[at - 1]) / step_before
     rise = (values[at + 1] - values[at]) / step_after
     bend = (rise - fall) / (step_before + step_after)
     slope = (fall * step_after + rise * step_before) / (step_before + step_after)
-    # beside an unbounded value a sample is its own vertex, like on a straight line
+    # next to an unbounded value a sample is its own vertex, as on a straight line
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
     return time[at] + step, values[at] + np.multiply(
@@ -322,7 +322,7 @@ def vertices(
 
 
 class Profile(NamedTuple):
-    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
+    """Frozen-deformation errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
 
     time: Samples
     error: Samples
@@ -336,7 +336,7 @@ class Profile(NamedTuple):
         return cls(time_before, lock_in_error(vibration, time_before, td))
 
     def minima(self) -> tuple[float, ...]:
-        """Return the times of the local minima, from parabolas through three squares, since L^2 is smooth [time]."""
+        """Return the times of the local minima [time], from parabolas through L^2, which is smooth."""
         t = self.time
         square = self.error**2
         if t.size < 3:
@@ -348,14 +348,14 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Interval between the two times around each of ``at``; infinite without two times [time]."""
+        """Return the interval between the samples on both sides of ``at``; infinite without two samples [time]."""
         if self.time.size < 2:
             return np.full(np.shape(at), np.inf)
         next_state = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[next_state] - self.time[next_state - 1])
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """Return how far each tr (n,) may be off before its error grows by 0.05; at most the profile's length [time].
+        """Return how far each tr (n,) may be off before L grows by 0.05, at most the length of the profile [time].
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
@@ -380,11 +380,11 @@ class Profile(NamedTuple):
     def _leaving(
         self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples
     ) -> Samples:
-        """Return the distance from each ``tr`` to where the error passes ``limit``, linear from ``outside`` inwards."""
+        """Return the distance from each ``tr`` to where the error exceeds ``limit``, by linear interpolation."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
         (t0, e0), (t1, e1) = (
             (self.time[at], self.error[at]) for at in (inside, outside)
         )
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # if no time lies between tr and the outside, the outside counts
+        # if no sample lies between tr and the first sample outside, that sample is used
         return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

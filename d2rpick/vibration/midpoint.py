@@ -1,4 +1,4 @@
-r"""Compute the error of any pair of times from the energy alone, for any number of modes, by the value halfway between.
+r"""Compute the error of any pair of times from the energy alone, for any number of modes, by its value halfway between.
 
 A linear structure in free flight has modes :math:`q_k = a_k e^{-g_k t} \cos(w_k t + p_k)`, scaled so that the elastic
 energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr and td and :math:`\tau` from tr to td,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """An interpretation of a spectrum, in which it is decided which lines are modes.
+    """An interpretation of a spectrum that decides which lines are modes.
 
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
@@ -80,7 +80,7 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """Return H, the energy of all modes without its changes within a period, of the shape of ``t`` [energy]."""
+        """Return H, the energy of all modes averaged over a period, of the shape of ``t`` [energy]."""
         if self.no_static:
             level = 2 * self.spectrum.mean.at(t)
         else:
@@ -93,10 +93,10 @@ class Reading:
 
     @cached_property
     def _within_period(self) -> Exponentials:
-        """Return how each mode's vibration energy changes within a period, since damping takes none at standstills."""
+        """Return the change of each mode's vibration energy within a period: damping acts only during motion."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
-        # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight on each line
+        # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight of each line
         turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 
@@ -109,27 +109,27 @@ class Reading:
         )
 
     def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return C, how far the modes are in step after td - tr, for broadcastable times [energy]."""
+        """Return C, the coherence of the modes after td - tr, for broadcastable times [energy]."""
         return np.asarray(
             np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """Return the factor of tr in the coherence, of its shape with an axis for modes after it [energy]."""
+        """Return the factor of tr in the coherence, with an axis for modes after the shape of tr [energy]."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """Return the factor of td in the coherence, of its shape with an axis for modes after it [-]."""
+        """Return the factor of td in the coherence, with an axis for modes after the shape of td [-]."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, the product of the deformations at tr and td, within its bounds [energy]."""
+        """Return X, the product of the deformations at tr and td, limited to its bounds [energy]."""
         bound = self.bound(tr, td)
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X without bounds, which noise and a wrong model may exceed [energy]."""
+        """Return X without limits; noise and a wrong model may exceed the bounds [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)

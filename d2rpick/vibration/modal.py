@@ -1,4 +1,4 @@
-"""Identify a vibration of any number of modes from the lines of the energy, with the doubts about it.
+"""Identify a vibration with any number of modes from the spectral lines of the energy, with all doubts.
 
 Lines can be interpreted in more than one way: how much of the mean is static, and which lines belong to a stretch
 rather than a mode.  The best interpretation is used; other ones, and the lines of the record's first part, widen the
@@ -28,7 +28,7 @@ from d2rpick.vibration.locked_lines import (
 )
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
-from d2rpick.vibration.swings import SOLVER_FLOOR
+from d2rpick.vibration.modes import SOLVER_FLOOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,53 +38,53 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Fewest states of a record in which lines are searched.
+# Fewest states of a record for a search of lines.
 _FEWEST_STATES: Final = 32
-# A static energy below this share of the mean vibration energy is scatter of the fit.
+# A static energy below this share of the mean vibration energy is due to the scatter of the fit.
 _NO_STATIC: Final = 0.12
-# Nothing vibrates if the energy swings by less than this share of its highest value: single precision resolves no less.
+# There is no vibration if the relative range of the energy is smaller: single precision resolves no less.
 _RESOLVED: Final = 2e-7
-# Smallest divisor, as a share of the swing of the record.
+# Smallest divisor, as a share of the range of the record.
 _TINY: Final = 1e-12
-# Number of times, in each direction, for pairs in which the overlap is compared with its bounds.
+# Number of values of tr, and of td, for which the overlap is compared with its bounds.
 _CHECKED: Final = 90
 
-# A stretch that leaves the static energy within this share of the mean may instead be a mode at half the rate.
+# A line may be a stretch or a mode of half the rate if the static energies differ by less than this share of the mean.
 _AMBIGUOUS: Final = 0.08
 
 # Limits above which a record is refused.
-_MOST_MISSED: Final = 0.5  # prediction error relative to the swing of the energy
-_MOST_MISFIT: Final = 0.3  # rest relative to the swing of the energy
+_MOST_MISSED: Final = 0.5  # prediction error relative to the range of the energy
+_MOST_MISFIT: Final = 0.3  # misfit relative to the range of the energy
 _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
     0.07,
     0.5,
-)  # negative static energy relative to the mean vibration energy, beyond the effect of noise
+)  # negative static energy relative to the mean vibration energy, in excess of noise
 _MOST_DRIFT: Final = (
     0.6  # change of the static energy relative to the mean vibration energy
 )
 _MOST_BEYOND: Final = 0.12  # overlap beyond its bounds relative to the vibration energy, rms over all pairs
-_MOST_HARMONIC: Final = 0.05  # lines locked to a first one, relative to it
+_MOST_HARMONIC: Final = 0.05  # size of harmonics relative to their fundamental line
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
     0.15,
     0.6,
-)  # energy of a stretch that the static energy does not contain
+)  # energy of a stretch that is missing in the static energy
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
-# Times per period of the fastest notable line at which deformations are evaluated.
+# Times per period of the fastest relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Refinement of these times at which the energy is linear between neighbours.
+# Refinement of these times between which the energy is linear.
 _FINER: Final = 4
 
-# Modes show a flight if they leave less than this share of the energy's swing and predict the rest within the second
-# share.
+# Largest misfit of modes that show a flight, as a share of the energy range.
+# The second value limits the prediction error of such modes.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # Half-width of the band of R^2 before it is widened for known errors, and how far a solver's structure is from a linear
 # one, relative to its deformation [-]: R of pairs of a shell box is off by 0.015 to 0.018 rms against all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 _VAGUE_HALF: Final = (
-    0.2  # half-width of R^2 of vague modes; well-identified ones have 0.02 to 0.1
+    0.2  # half-width of R^2 of vague modes; well-identified modes have 0.02 to 0.1
 )
 _SOME_TIMES: Final = 64  # at which the band is looked at as a whole
 # Standard deviations of R^2 that its band has to each side, as for one oscillator.
@@ -106,7 +106,7 @@ _HIDDEN_LINES: Final = 12  # number of lines that may hide in the rest of the fi
 
 
 class Doubts(NamedTuple):
-    """What contradicts that a record is that of a linear structure in free flight, each 0 without a doubt [-].
+    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -124,16 +124,16 @@ class Doubts(NamedTuple):
 
     @property
     def refusal(self) -> str | None:
-        """Return the reason for refusing the record, None if there is none."""
+        """Return the reason for refusing the record; None if there is none."""
         return self._first_of(_MOST_NEGATIVE, _MOST_UNSTRETCHED)
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason for refusing the record even if no better model is known, None if there is none."""
+        """Return the reason for refusing the record if no better model exists; None if there is none."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason for a refusal, with the given limits."""
+        """Return the first reason for a refusal under the given limits."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,
@@ -174,7 +174,7 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies at times so close that they are linear between them [time], [energy]."""
+    """Elastic energies at times so close that linear interpolation is exact enough [time], [energy]."""
 
     time: Samples
     energy: Samples
@@ -182,7 +182,7 @@ class _Course(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalVibration:
-    """The vibration of a structure of many modes in a window of free flight.
+    """The vibration of a structure with many modes in a window of free flight.
 
     Parameters
     ----------
@@ -235,18 +235,18 @@ class ModalVibration:
 
     @property
     def signed(self) -> bool:
-        """Return True if nothing refuses the record."""
+        """Return True if there is no reason to refuse the record."""
         return (
             self.doubts.refusal_at_all if self.last_resort else self.doubts.refusal
         ) is None
 
     def as_last_resort(self) -> ModalVibration:
-        """Return the same vibration with wider limits of doubt, for use if no better model is known."""
+        """Return the same vibration with wider limits of doubt, for use if no better model exists."""
         return replace(self, last_resort=True)
 
     @property
     def convinces(self) -> bool:
-        """Return True if the modes predict the record so well that nothing else can act on it."""
+        """Return True if the modes predict the record so well that no other load can act on it."""
         white = 1 - self.systematic
         structure = self.doubts.misfit * np.sqrt(self.systematic)
         missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
@@ -254,7 +254,7 @@ class ModalVibration:
 
     @property
     def told(self) -> str:
-        """Return what a choice rests on, in words: the modes by their rates."""
+        """Return a description of what a choice is based on: the modes with their rates."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         if rates.size == 1:
@@ -264,7 +264,7 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
-        """Return the modes with their energy at ``td``, the slowest first."""
+        """Return the modes with their energies at ``td``, the slowest mode first."""
         poles = self.reading.modes.poles
         energies = self.reading.energies_of_modes(td)
         rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
@@ -275,7 +275,7 @@ class ModalVibration:
         return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
-        """Return True if the modes were identified at td and more vibrates there than the solver's error."""
+        """Return True if the modes were identified at td and their energy exceeds the error of the solver."""
         level = self.reading.level(np.append(self.time[[0, -1]], td))
         return bool(
             self.time[0] <= td <= self.time[-1]
@@ -295,7 +295,7 @@ class ModalVibration:
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, the product of the deformations at tr and td, for times of one shape, or one of them [energy]."""
+        """Return X, the product of the deformations at tr and td, for arrays of one shape, or one number [energy]."""
         return self.reading.overlap(tr, td)
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -306,7 +306,7 @@ class ModalVibration:
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
-        """Return lock-in errors at those of ``time`` before ``td``, from values computed once for all td."""
+        """Return frozen-deformation errors at each ``time`` before ``td``, from values computed once for all td."""
         last = int(np.searchsorted(self.time, td))
         elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2
@@ -326,7 +326,7 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return the elastic energy at ``time``, at finer times, and the factor of tr in the coherence."""
+        """Return elastic energies at ``time`` and at finer times, and the factor of tr in the coherence."""
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
@@ -377,7 +377,7 @@ class ModalVibration:
 
     @cached_property
     def is_vague(self) -> bool:
-        """Return True if the band of most pairs is so wide that it hardly separates them."""
+        """Return True if the band of most pairs is so wide that it hardly distinguishes them."""
         some_times = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
         widths = [
             self.half_width(some_times, td) for td in some_times[:: _SOME_TIMES // 8]
@@ -387,14 +387,14 @@ class ModalVibration:
     def residual_band(
         self, stated: Samples, tr: Samples, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the residual of each tr (n,), and the lowest and highest that the record allows [-].
+        """Return the residual of each tr (n,) with its lower and upper bound [-].
 
         Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.
         """
         return measures.band_about(np.square(stated), self.half_width(tr, td), 0.0, 0.0)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the share of the vibration energy at td that corresponds to the band, from each tr on [-].
+        """Return the share of the vibration energy at td that corresponds to the band, for each tr [-].
 
         A hidden mode in opposite phase at tr and td adds four times its share to R^2.
         """
@@ -402,7 +402,7 @@ class ModalVibration:
 
     @cached_property
     def _phase_share(self) -> float:
-        """Share of R^2 that depends on the phases at td, of all modes [-]."""
+        """Return the share of R^2 that depends on the phases of all modes at td [-]."""
         modes = self.reading.modes
         poles = modes.poles
         sizes = np.abs(modes.weights)
@@ -411,7 +411,7 @@ class ModalVibration:
 
     @cached_property
     def _wrong(self) -> float:
-        """Return what widens the band of all pairs equally [-]."""
+        """Return the error that widens the band of all pairs equally [-]."""
         doubts = self.doubts
         if self.reading.no_static:
             return doubts.harmonic  # the other reading shows what the mean is worth
@@ -425,7 +425,7 @@ class ModalVibration:
     def _of_other_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> Samples:
-        """Return how far R^2 may be off because the lines can be interpreted in another way [-]."""
+        """Return the error of R^2 because the lines have other interpretations [-]."""
         apart = [
             np.abs(reading.residual_squared(tr, td) - squared)
             for reading in self.others
@@ -434,7 +434,7 @@ class ModalVibration:
             if apart:
                 return np.asarray(np.max(apart, axis=0))
             return np.zeros(squared.shape)
-        # lines hidden in the rest have at most this energy beside the identified ones
+        # lines hidden in the misfit have at most this energy in addition to the identified lines
         hidden = (
             _find_most_hidden(self.reading.spectrum.rest)
             / self.reading.level(td)
@@ -444,14 +444,14 @@ class ModalVibration:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Return True if lines at half the rate of others may be those of a stretch or of modes."""
+        """Return True if lines at half the rate of others may belong to a stretch or to modes."""
         return not self.reading.is_mode.all() and bool(self.others)
 
 
 def identify_modal(
     time: Samples, energy: Samples, *, kinetic: bool = False
 ) -> ModalVibration | None:
-    """Identify the modes of a structure from its energy in free flight; return None if it has no lines.
+    """Identify the modes of a structure from its energy in free flight; None if it has no lines.
 
     The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in it is slow:
     the sum of elastic and kinetic energy of a mode falls without a swing.
@@ -509,7 +509,7 @@ def confirm_by_kinetic_energy(
 
 
 def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
-    """Return True if the kinetic energy may decide because plastic flow or a damper's work refuses the internal energy.
+    """Return True if kinetic energy may decide, as plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
     """
@@ -527,7 +527,7 @@ def _read(
     *,
     kinetic: bool = False,
 ) -> ModalVibration:
-    """Interpret the lines in the best way, and in others; the mean of a ``kinetic`` energy has no meaning.
+    """Interpret the lines in the best way and in other ways; the mean of a ``kinetic`` energy has no meaning.
 
     ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
     """
@@ -653,7 +653,7 @@ def _compute_sine(squared: Samples) -> Samples:
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
-    """Count the states in a period of the fastest line that is notable, and no scatter."""
+    """Count the states per period of the fastest relevant line that is not scatter."""
     sizes = np.abs(lines.weights)
     least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
     fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
@@ -668,7 +668,7 @@ def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
-    """Return times over a window so close that a parabola through three of them finds a minimum [time]."""
+    """Return times in a window so close that a parabola through three of them finds a minimum [time]."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]

@@ -1,4 +1,4 @@
-"""Find where in a record the modes of one structure continue undisturbed, if nothing else shows its flight."""
+"""Find the window in which the modes of one structure continue undisturbed, if no other evidence shows a flight."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 _PARTS: Final = 16
 # Shares of the record at which windows that reach its end begin.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate by less than this
-# share of the vibration energy, or this many times the scatter of such means.
+# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate little:
+# by less than this share of the vibration energy, or this many times the scatter of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
 # Most repetitions of extending and identifying a window.
 _MOST_REFITS: Final = 3
@@ -38,7 +38,7 @@ class ModalWindow(NamedTuple):
 def find_described(
     history: History, td: float, guess: Span | None
 ) -> ModalWindow | None:
-    """Find a window around td whose modes go on by themselves; None if none is found.
+    """Find a window around td in which modes continue undisturbed; None if none is found.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
-    """Return the whole parts of a record within a guessed window, so that guesses of many td share few windows."""
+    """Return the complete sixteenths of the record in a guessed window, so that many td share few windows."""
     first = float(history.time[0])
     last = float(history.time[-1])
     part = (last - first) / _PARTS
@@ -100,7 +100,7 @@ def get_outer_window(history: History, guess: Span) -> Span:
 
 
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
+    """Yield windows to try: the guessed one, then later ones up to the end of the record."""
     if guess is not None:
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
@@ -142,7 +142,7 @@ def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
 
 
 def _find_reach(history: History, found: ModalWindow) -> Span:
-    """Give the window in which the record stays with the modes, at least that in which they were found."""
+    """Return the window in which the record follows the modes, at least the one of their identification."""
     time = history.time
     energy = history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
@@ -168,12 +168,12 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Return the number of states, ordered towards the window, up to the last one that deviates from the modes."""
+    """Count the states up to the last that deviates from the modes; all of them precede the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(
         over="ignore", invalid="ignore"
-    ):  # far away, damped modes grow beyond all numbers
+    ):  # far from the window, damped modes overflow
         deviation = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(

@@ -1,4 +1,4 @@
-"""Decide which model of the vibration can be relied on at one td, and what is known there.
+"""Decide which model of the vibration is reliable at one td, and what it shows there.
 
 The order is that of `MODELS`: the signs of parts before an oscillator that describes the record, this before the modes
 of the structure and counted swings unless it leaves much over, and these before the energy alone.  The result is a
@@ -46,22 +46,22 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
-# Reason why no tr can be trusted if the vibration is known but lost in noise at td.
+# Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# Residual of a release without any vibration: a switch that leaves more keeps nothing [-].
+# Residual of a release without any vibration: a switch with a larger residual preserves nothing [-].
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the time up to td saves little, and resembles td only because it is near.
+# A tr in this last share of the time before td saves little, and resembles td only because it is close.
 NEAR_TD: Final = 0.25
-# Number of parts that a warning names for one reason; JSON has all.
+# Number of parts that a warning names for one reason; the JSON names all.
 _NAMED = 5
 
 
 class Compared(NamedTuple):
-    """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
+    """Deformations that can be compared with those at td, from ``first`` to ``last`` [time].
 
-    ``profile`` returns their lock-in error before a td; it is None for one mode, which has a closed form.  ``band`` is
-    that of a residual.
+    ``profile`` returns their frozen-deformation error before a td; it is None for one mode, which has a closed form.
+    ``band`` is that of a residual.
     """
 
     deformation: Deformation
@@ -73,7 +73,7 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Vibration:
-    """A vibration seen from one td.
+    """The vibration as the best reliable model describes it for one td.
 
     Parameters
     ----------
@@ -107,29 +107,29 @@ class Vibration:
 
     @property
     def td(self) -> float:
-        """Return the td from which the vibration is seen [time]."""
+        """Return the td for which the vibration is described [time]."""
         return self.whole.td
 
     @property
     def signed(self) -> SignedParts | None:
-        """Return the parts whose signs are relied on, None if no signs are."""
+        """Return the parts whose signs are used; None if no signs are used."""
         return self.parts if self.basis == "parts" else None
 
     @property
     def modal(self) -> ModalVibration | None:
-        """Return the modes of the structure that are relied on; None if they are not."""
+        """Return the modes of the structure that are used; None if none are used."""
         if self.basis == "modal" and self.compared:
             return cast("ModalVibration", self.compared.deformation)
         return None
 
     @property
     def reasons(self) -> str | None:
-        """Return the reason why no deformation with its sign is known, including single parts; None if one is known."""
+        """Return the reasons why no signed deformation is known, also of single parts; None if one is known."""
         if self.compared or not self.parts:
             return self.unknown
         names: dict[
             str | None, list[str]
-        ] = {}  # by reason, since all parts of a structure often share one
+        ] = {}  # grouped by reason, since all parts of a structure often share one
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
         of_parts = (
@@ -140,21 +140,21 @@ class Vibration:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Return K at td, None if it is unknown [-]."""
+        """Return K at td [-]; None if it is unknown."""
         if self.compared is None:
             return None
         return float(measures.kinetic_share(self.compared.deformation, self.td))
 
     @cached_property
     def profile(self) -> Profile | None:
-        """Return the lock-in error before td, whose minima are closest matches; None if there are none."""
+        """Return the frozen-deformation error before td, whose minima are the closest matches; None without one."""
         if self.compared is None or self.compared.profile is None:
             return None
         return self.compared.profile(self.td)
 
     @cached_property
     def least_residual(self) -> float | None:
-        """Return the smallest residual among all tr that save much, for a vibration of many modes, else None [-]."""
+        """Return the smallest residual of all tr with large savings [-] if there are many modes; otherwise None."""
         if self.basis != "modal" or self.profile is None or self.compared is None:
             return None
         last = self.td - NEAR_TD * (self.td - self.compared.first)
@@ -165,12 +165,12 @@ class Vibration:
 
     @property
     def keeps_nothing(self) -> bool:
-        """Return True if no tr that saves much is better than a release without any vibration."""
+        """Return True if no tr that saves much is better than a release without vibration."""
         return self.least_residual is not None and self.least_residual > NOTHING_KEPT
 
     @property
     def most_lock_in(self) -> float | None:
-        """Return the largest useful lock-in error of a tr, for a vibration of many modes; None for others [-]."""
+        """Return the largest useful frozen-deformation error of a tr [-], for many modes; otherwise None."""
         if self.basis != "modal":
             return None
         least_residual = self.least_residual or 0.0
@@ -183,7 +183,7 @@ class Vibration:
         )
 
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
-        """Return times before td that may serve as tr: crossings, standstills near the level, and closest matches.
+        """Return candidate times before td: level crossings, extrema near the level, and closest matches.
 
         Times before ``since`` [time] may be left out.
         """
@@ -197,7 +197,9 @@ class Vibration:
         else:
             turns = self.whole.turns_near(tolerance, since)
         matches = self.profile.minima() if self.profile else ()
-        if self.basis == "modal":  # the common level of all modes decides nothing
+        if (
+            self.basis == "modal"
+        ):  # the total energy level of many modes is no criterion
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(
@@ -205,7 +207,7 @@ class Vibration:
         )
 
     def _least_deformed(self) -> tuple[float, ...]:
-        """Return the time of least elastic vibration energy if no tr keeps the vibration; it keeps the static part."""
+        """Return the time of least elastic energy if no tr preserves the vibration; it preserves the static part."""
         if not self.keeps_nothing or self.compared is None or self.profile is None:
             return ()
         times = self.profile.time
@@ -222,13 +224,13 @@ class Vibration:
         )
 
     def measured(self, times: Samples) -> Columns:
-        """Return the measures of each time as tr, as far as its deformation can be compared with that at td."""
+        """Return the measures of each time as tr if its deformation can be compared with that at td."""
         return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors that a tolerance limits, of the shape of ``times``; infinite if none would help [-].
+        """Return the errors limited by the tolerance, of the shape of ``times``; infinite if no tr is useful [-].
 
-        The lock-in error if signs are known (for a few modes only if they match), else the level error.
+        The frozen-deformation error if signs are known (for a few modes only if they match), else the level error.
         """
         if self.compared is None:
             errors = measures.level_error(
@@ -248,9 +250,9 @@ class Vibration:
         return np.append(self.whole.edges(), self.profile.time if self.profile else ())
 
     def reach(self, moments: Moments) -> Samples:
-        """Return how far the true time of each moment may be off; for a match half a cell of the profile [time]."""
+        """Return the uncertainty of each moment [time]; for a match, half an interval of the profile."""
         reach = self.whole.reach(moments.tr)
-        # a match lies at the least error
+        # a match is at the least error
         if self.profile:
             return np.where(
                 moments.are("match"), self.profile.cell(moments.tr) / 2, reach
@@ -258,23 +260,23 @@ class Vibration:
         return reach
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
-        """Return the contribution of each part to the mismatch; nothing if single parts are unknown."""
+        """Return the contribution of each part to the mismatch; empty if single parts are unknown."""
         if self.signed is None:
             return ()
         from d2rpick.vibration.part_signs import (
             list_contributions,
-        )  # imported here: a table has no parts
+        )  # imported here, because tables have no parts
 
         return list_contributions(self.signed, tr, self.td)
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
-        """Return for each time whether its deformation can be compared with that at td."""
+        """Return an array that is True if the deformation at a time can be compared with that at td."""
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
 
     def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
-        """Return columns of measures of comparable times (n,) for one ``td``, for a single mode also for one each."""
+        """Return columns of measures of comparable times (n,), for one ``td`` or for one td each (single mode)."""
         assert self.compared
         deformation = self.compared.deformation
         if isinstance(deformation, Mode):
@@ -293,7 +295,7 @@ class Vibration:
 def find_moments(
     vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Return the moments of each vibration, as ``Vibration.moments`` does, for one mode all at once.
+    """Return the candidate times of each vibration, as `Vibration.moments` does; those of one mode together.
 
     Parameters
     ----------
@@ -324,7 +326,7 @@ def find_moments(
 def measure_all(
     vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
 ) -> tuple[Samples, Columns]:
-    """Return the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
+    """Return the energy of each tr (n,), and its measures if its deformation is comparable with that at its td.
 
     Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
@@ -358,7 +360,7 @@ def measure_all(
 
 
 def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
-    """Yield the indices of vibrations that one mode describes in one window together, and all others singly."""
+    """Yield index groups of vibrations with the same mode and window, and single indices of all others."""
     groups: dict[object, list[int]] = {}
     for position, vibration in enumerate(vibrations):
         whole = vibration.whole
@@ -373,7 +375,7 @@ def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 
 
 class Evidence(NamedTuple):
-    """What was found in a record, whatever it is worth at one td.
+    """Models that were found in a record, regardless of their reliability at a td.
 
     ``fit`` is None only if no oscillator was searched; ``span`` is the window that it describes.  ``given`` is True for
     a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
@@ -393,7 +395,7 @@ class Evidence(NamedTuple):
 
     @property
     def signed(self) -> str | None:
-        """Return the name of the model that tells the sign, None if none does."""
+        """Return the name of the model that gives the sign; None if none does."""
         return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
@@ -410,18 +412,18 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """States per period of the fastest line of the energy [-]; None if no lines were looked for."""
+        """Return the states per period of the fastest line of the energy [-]; None if no lines were searched."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def has_model(self) -> bool:
-        """Return True if at some td more than the samples of the energy may be relied on."""
+        """Return True if more than the samples of the energy may be used at some td."""
         fit = self.fit
         return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
 
     def is_that_of(self, other: Evidence) -> bool:
-        """Return True if the same was found, in one record."""
+        """Return True if the same models were found in the same record."""
         same = self.fit is other.fit and self.span == other.span
         return same and all(
             self.models.get(name) is other.models.get(name) for name in MODELS
@@ -429,12 +431,12 @@ class Evidence(NamedTuple):
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Return the best model that can be relied on; ``whole`` is the model of the whole energy."""
+    """Return the best reliable model; ``whole`` is the model of the total energy."""
     return replace(_choose_best(whole, evidence), parts=evidence.parts)
 
 
 def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Choose the model that can be relied on."""
+    """Choose the best reliable model."""
     if not evidence.signed:
         return whole
     basis = evidence.signed
@@ -450,8 +452,8 @@ def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
-    # structure that neighbouring states share is a further mode, which the modes describe better; white noise can only
-    # hide one
+    # Structure that neighbouring states share is a further mode, which the modes describe better.
+    # White noise can only hide a mode.
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
         return _compare_with_signs(
@@ -463,7 +465,7 @@ def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
 
 
 def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
-    """Return a vibration with signed deformations, while levels and times are those of the whole energy."""
+    """Return a vibration with signed deformations, and with levels and times of the total energy."""
     first = model.comparable_since(whole.td)
     return replace(
         whole,
@@ -481,7 +483,7 @@ def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vib
 
 
 def _note_sunk(whole: Vibration) -> Vibration:
-    """Add that the parts vibrate less at td than the solver's error."""
+    """Add the note that the vibration of the parts at td is below the error of the solver."""
     unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
     return replace(
         whole,
@@ -491,7 +493,7 @@ def _note_sunk(whole: Vibration) -> Vibration:
 
 
 def is_doubtful(whole: Vibration) -> bool:
-    """Return True if no oscillator is known, or one that leaves so much that its sign may be wrong."""
+    """Return True if no oscillator is known, or its misfit is so large that its sign may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
         or whole.whole.fit.hidden_share > SMALLEST
@@ -499,7 +501,7 @@ def is_doubtful(whole: Vibration) -> bool:
 
 
 def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Return the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
+    """Return the reliable model of the total energy at ``td``: an oscillator, else the samples."""
     fit = evidence.fit
     whole = describe_energy_at(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
@@ -540,7 +542,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
 def describe_energy_at(
     history: History, td: float, evidence: Evidence
 ) -> SampledEnergy:
-    """Return the best description of the energy, whatever it is worth at ``td``: an oscillator, else samples."""
+    """Return the best description of the energy, also if it is unreliable at ``td``: an oscillator, else samples."""
     fit = evidence.fit
     span = evidence.span
     if fit and fit.mode and span:
@@ -556,6 +558,7 @@ def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
     states = count_samples_per_period(time, fit.mode)
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
+    text = f"the energy has {states:.3g} states per period"
     return (
-        f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+        f"{text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
     )

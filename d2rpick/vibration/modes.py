@@ -1,4 +1,4 @@
-"""Describe in closed form the internal energy that one vibration mode stores and gives back."""
+"""Compute the internal energy that one vibration mode stores and returns, in closed form."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Samples per block, so that intermediate results stay in the processor's cache.
+# Samples per block, so that intermediate results fit into the cache of the processor.
 BLOCK: Final = 8192
-# Most steps of the root search; bisection alone needs no more to reach rounding.
+# Most steps of the root search; bisection alone reaches rounding with them.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
+# Energies below this share of the highest one may be no vibration: solver errors are 1/10 of it at any time.
+SOLVER_FLOOR: Final = 1e-4
 # A deformation below this share of the amplitude is zero within rounding.
 _ZERO = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
 class Mode(SignedAmplitudes):
-    r"""One under-damped vibration and the internal energy it makes.
+    r"""One under-damped vibration mode and its internal energy.
 
     .. math::
         E(t) = E_{pl} + q(t)^2, \quad
@@ -123,7 +125,7 @@ class Mode(SignedAmplitudes):
         return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
 
     def energy_gradient(self, t: Samples, size: int) -> Samples:
-        """Return derivatives of E(t) by the first ``size`` parameters of the class without origin, (size, n)."""
+        """Return the derivatives of E(t) by the first ``size`` parameters of the class without origin, (size, n)."""
         own_gradient = np.array(
             [
                 self.omega,
@@ -137,7 +139,7 @@ class Mode(SignedAmplitudes):
         return compute_energy_and_jacobian(own_gradient, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
-        """Find the first time from ``t`` on at which the deformation stands still; the next is half a period later."""
+        """Find the first time after or at ``t`` with q' = 0; the next one is half a period later."""
         cosine, sine = self._velocity_parts
         phase = np.arctan2(
             -cosine, sine
@@ -146,8 +148,8 @@ class Mode(SignedAmplitudes):
         return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) at which the deformation stands still (q' = 0), in ascending order [time]."""
-        if not start < end:  # ``start`` need not even be a time with a finite phase
+        """Find the times in (start, end) with q' = 0, in ascending order [time]."""
+        if not start < end:  # ``start`` may be a time without a finite phase
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(
@@ -165,7 +167,7 @@ class Mode(SignedAmplitudes):
         return tuple(times[q * (q - self.preload) > 0].tolist())
 
     def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) at which q passes ``level_q``, in ascending order, to rounding [time].
+        """Find the times in (start, end) at which q equals ``level_q``, in ascending order and to rounding [time].
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
@@ -174,15 +176,15 @@ class Mode(SignedAmplitudes):
         )
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
-        """Find the times in (start, td) at which the energy passes its level at ``td``, in ascending order [time]."""
+        """Find the times in (start, td) at which the energy equals that at ``td``, in ascending order [time]."""
         return tuple(self.all_level_crossings(np.array([td]), start)[1].tolist())
 
     def all_level_crossings(
         self, td: Samples, start: float
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find these crossings for each ``td`` of shape (n,) at once: return the index of the td, and the time."""
+        """Find these crossings for every ``td`` (n,) at once; return the index of the td, and the time."""
         level = self.deformation(td)
-        # each passage meets a level of zero once, whatever sign rounding gives it
+        # each zero passage crosses the level zero once, regardless of the sign of rounding
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
@@ -194,7 +196,7 @@ class Mode(SignedAmplitudes):
     def _passages(
         self, levels: Samples, start: float, ends: Samples
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find the times in (start, end) at which q passes a level, for each level and its end, both of shape (n,).
+        """Find the times in (start, end) at which q equals a level, for each level and end, both of shape (n,).
 
         Return the indices of the levels and the times, ascending in both.
         """
@@ -271,7 +273,7 @@ def compute_energy_and_jacobian(
     twice = q + q
     jacobian = np.empty(
         (size, s.size)
-    )  # written in place: identification spends most of its time here
+    )  # written in place, because identification spends most of its time here
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])
     jacobian[1] *= -0.5

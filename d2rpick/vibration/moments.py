@@ -1,4 +1,4 @@
-"""Find times that may serve as tr: times at which the total energy has the level of td, with their errors.
+"""Find candidate times for tr: times at which the total energy equals that at td, with their errors.
 
 The energy around a td is known by its samples, or by modes that describe them.
 """
@@ -29,31 +29,30 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# If the scatter of the last period exceeds this share of the vibration energy at td, the vibration is lost in it: its
-# sign is uncertain.
+# If the scatter of the last period exceeds this share of the vibration energy at td, the sign is uncertain.
 _DROWNED = 0.2
 # Times closer than this share of a radian are equal within rounding.
 _ZERO = 1e-9
 
-# Kinds of moments: crossing of the level, extremum near it, match of the deformations of several parts or modes, start
-# of a flight in which nothing vibrates, given time.
+# Kinds of moments: crossing of the level, extremum near the level, and match of several deformations.
+# Further kinds are the start of a flight without vibration, and a given time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
-# Between samples E'' may exceed the second differences; on random vibrations with 8 samples per period or more, a
-# quarter more covers 99 % of the true crossings.
+# Between samples E'' may exceed the second differences. On random vibrations with at least 8 samples per period,
+# 25 % more covers 99 % of the true crossings.
 _BEND_RESERVE = 1.25
 # Three standard deviations contain 99.7 % of normal errors.
 _DEVIATIONS = 3.0
-# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum contain 99 % of it, and
-# they add to the error of the bend as independent errors.
+# Rounding errors are many and independent: 2.6 standard deviations of their sum cover 99 %.
+# They are added to the interpolation error as independent errors.
 _ROUNDING_DEVIATIONS = 2.6
-# The systematic rest of a fit is mostly a vibration, whose peaks are sqrt(2) times its rms.
+# The systematic misfit is mostly a vibration, whose peaks are sqrt(2) times its rms.
 _PEAK_OF_REST = sqrt(2)
-# Reserve, as a share of the output interval: however well a fit follows the samples, it is a model between them.
+# Reserve, as a share of the output interval: even a close fit is only a model between the samples.
 _BETWEEN_SAMPLES = 1e-3
 
 
 class SampledEnergy:
-    """The samples of a record seen from ``td``, linear between them."""
+    """The samples of a record for one ``td``, with linear interpolation."""
 
     mode: Mode | None = None
 
@@ -61,17 +60,17 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return E at a time: from the modes if they describe the record there, else from the samples [energy]."""
+        """Return E at a time, from the modes where they describe the record, else from the samples [energy]."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
 
     def energies(self, times: Samples) -> Samples:
-        """Return E at many times, of their shape [energy]."""
+        """Return E at the given times, of their shape [energy]."""
         return self.history.energies_at(times)
 
     def described(self, time: float) -> bool:  # noqa: ARG002  of samples alone there is no model
-        """Return True if the energy at a time is that of modes."""
+        """Return True if modes describe the energy at a time."""
         return False
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
@@ -80,14 +79,14 @@ class SampledEnergy:
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
     def crossings(self, since: float) -> Passages:
-        """Return the times from ``since`` to td at which the energy crosses the level, and which rise, shape (k,)."""
+        """Return the times from ``since`` to td at which the energy crosses the level, and whether it rises (k,)."""
         time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
         in_question = (since <= times) & (times < self.td)
         return times[in_question], rising[in_question]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
-        """Return the times from ``since`` to td at which the energy turns within the tolerance of the level (k,)."""
+        """Return the times from ``since`` to td (k,) at which the energy turns within the tolerance of the level."""
         time, energy = self._sampled_before(since)
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
@@ -102,16 +101,16 @@ class SampledEnergy:
         return np.append(time, self.td), np.append(energy, self.energy(self.td))
 
     def edges(self) -> Samples:
-        """Return the times before td between which the energy of modes is monotone; empty for samples [time]."""
+        """Return the times before td between which the energy of modes is monotone [time]; empty for samples."""
         return np.zeros(0)
 
     def reach(self, times: Samples) -> Samples:
-        """Return how far from each time the energy may have the level of td [time]."""
+        """Return how far from each time the energy may equal that at td [time]."""
         return compute_sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
 class OscillatorEnergy(SampledEnergy):
-    """The ``mode`` of a ``fit`` that describes a record within ``span``, seen from a ``td`` in it."""
+    """The ``mode`` of a ``fit`` that describes a record in ``span``, for a ``td`` in the span."""
 
     mode: Mode
 
@@ -124,7 +123,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @cached_property
     def sunk(self) -> str | None:
-        """Return a doubt if the vibration at td does not exceed the scatter of the record about it, else None."""
+        """Return a doubt if the vibration at td does not exceed the scatter of the record, else None."""
         start, end = (
             max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
             max(self.td, self.span.start),
@@ -138,21 +137,21 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # could not be even if all scatter of the fit lay here
+            return None  # impossible even if the complete scatter of the fit were here
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         if (
             vibration > 0 and scatter <= _DROWNED * vibration
-        ):  # both may be too small for a number
+        ):  # both energies may underflow
             return None
         finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
         return f"{finding}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
-        """Return E at many times, of their shape [energy]."""
+        """Return E at the given times, of their shape [energy]."""
         return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
-        """Return True if ``time`` lies in the window that the modes describe."""
+        """Return True if ``time`` lies in the window described by the modes."""
         return self.span.start <= time <= self.span.end
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
@@ -161,11 +160,11 @@ class OscillatorEnergy(SampledEnergy):
 
     @property
     def before(self) -> float:
-        """Return a time just before the span, so that its first sample counts like any other [time]."""
+        """Return a time just before the span, so that its first sample is treated like all others [time]."""
         return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
-        """Return the crossing times, sampled before the span and exact within it, and which of them rise."""
+        """Return crossing times, from samples before the span and exact in it, and whether the energy rises."""
         times = np.maximum(
             self.mode.level_crossings(self.td, self.before), self.span.start
         )
@@ -183,7 +182,7 @@ class OscillatorEnergy(SampledEnergy):
         return sampled[sampled < self.span.start], up[sampled < self.span.start]
 
     def standstills(self) -> Samples:
-        """Return the times within the span, up to td itself, at which the energy turns [time]."""
+        """Return the times in the span before td at which the energy turns, and td itself if it does [time]."""
         end = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
@@ -205,7 +204,7 @@ class OscillatorEnergy(SampledEnergy):
         )
 
     def within(self, times: Samples) -> NDArray[np.bool_]:
-        """Return for each time whether it lies in the window that the modes describe."""
+        """Return an array that is True for times in the window described by the modes."""
         return (times >= self.span.start) & (times <= self.span.end)
 
     def _each(
@@ -214,9 +213,9 @@ class OscillatorEnergy(SampledEnergy):
         inside: Callable[[Samples], Samples],
         outside: Callable[[Samples], Samples],
     ) -> Samples:
-        """Apply one function to times in the window that the modes describe, another to the others."""
+        """Apply one function to times in the window described by the modes, another function to all others."""
         is_described = self.within(times)
-        if is_described.all():  # as in nearly all cases
+        if is_described.all():  # the usual case: modes describe all times
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (
@@ -228,7 +227,7 @@ class OscillatorEnergy(SampledEnergy):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Moments:
-    """Times that may serve as tr, before anything is measured, as columns of shape (n,).
+    """Candidate times for tr before any measure is computed, as columns of shape (n,).
 
     Noise makes tens of thousands, and few of them are examined singly.  ``tr`` [time]; ``kind``: index of the kind's
     name; ``rising``: 1 if the energy rises, -1 if it falls, 0 if neither.
@@ -240,7 +239,7 @@ class Moments:
 
     @classmethod
     def of(cls, kind: str, times: Samples | Sequence[float]) -> Moments:
-        """Make moments of one kind, without the direction of the energy."""
+        """Make moments of one kind without the direction of the energy."""
         none = np.zeros(len(times), np.int8)
         return cls(
             np.array(times, dtype=float), none + np.int8(_KINDS.index(kind)), none
@@ -250,7 +249,7 @@ class Moments:
     def of_level(
         cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments
     ) -> Moments:
-        """Make moments from crossings of the level, shape (k,), followed by other moments."""
+        """Make moments from level crossings, shape (k,), followed by further moments."""
         kind = np.zeros(crossings.size, np.int8)
         sides = np.where(rising, 1, -1).astype(np.int8)
         return cls.joined([cls(crossings, kind, sides), *others])
@@ -269,11 +268,11 @@ class Moments:
         )
 
     def are(self, kind: str) -> NDArray[np.bool_]:
-        """Return for each moment whether it is of a kind."""
+        """Return an array that is True for moments of a kind."""
         return np.asarray(self.kind == _KINDS.index(kind))
 
     def at(self, places: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Moments:
-        """Return the moments at some indices, in their order, or those that a mask selects."""
+        """Return the moments at given indices, in their order, or those selected by a mask."""
         return Moments(self.tr[places], self.kind[places], self.rising[places])
 
     def __len__(self) -> int:
@@ -292,7 +291,7 @@ class Moments:
 def find_moments_of_mode(
     seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Return the moments of one mode in one window, in ascending order, for each td from which it is ``seen``.
+    """Return the moments of one mode in one window, ascending, for each td for which it is ``seen``.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
     """
@@ -332,7 +331,7 @@ def find_moments_of_mode(
 def compute_sampled_reach(
     history: History, times: Samples, td: float, level: float
 ) -> Samples:
-    """Return the distance to the true crossing if tr comes from the samples, linear between them.
+    """Return the distance to the true crossing if tr is interpolated linearly between samples.
 
     Parameters
     ----------
@@ -354,7 +353,7 @@ def compute_sampled_reach(
     cell, interval = _find_cells(time, times)
     at_td, _ = _find_cells(time, np.atleast_1d(td))
     bend = estimate_curvature(time, energy, times)
-    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours, zero on a sample
+    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours, zero at a sample
     off_td = (
         float(estimate_curvature(time, energy, td))
         * (td - time[at_td])
@@ -374,7 +373,7 @@ def compute_sampled_reach(
 def compute_fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
-    """Return the distance to the true crossing if tr and the level come from the fitted oscillator.
+    """Return the distance to the true crossing if tr and the level follow from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
     record about it, and the systematic part of the misfit.  Arguments and result are those of
@@ -400,7 +399,7 @@ def compute_fitted_reach(
 
 
 def _estimate_local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
-    """Return the systematic rest of a fit near each time: its rms, or more if the vibration is larger [energy]."""
+    """Return the systematic misfit near each time: its rms, or more where the vibration is larger [energy]."""
     return np.asarray(
         fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
     )
@@ -413,7 +412,7 @@ def _find_cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
 
 
 def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
-    """Return the largest error of the interpolated energy due to printed digits, and its mean square [energy].
+    """Return largest error and mean square of the interpolated energy due to printed digits [energy].
 
     Energy and time of both neighbours are off by up to half a quantum each, uniformly distributed.
     """
@@ -430,12 +429,12 @@ def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
 
 
 def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
-    """Return half of the quantum to which each value was rounded."""
+    """Return half of the rounding step of each value."""
     return precision.quanta(values) / 2
 
 
 def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
-    """Return the largest |E''| near ``at``: of the four second divided differences about its cell [energy/time^2].
+    """Return the largest |E''| near ``at``, from four second divided differences around it [energy/time^2].
 
     Zero where the record has fewer than three samples.
     """
@@ -453,7 +452,7 @@ def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> S
 def compute_reach(
     slope: Samples | float, bend: Samples | float, error: Samples | float
 ) -> Samples:
-    """Return how far in time a crossing may be off if the energy there is wrong by ``error``.
+    """Return the time error of a crossing for an energy error ``error``.
 
     The smaller root x of slope x - bend x^2/2 = error; without a root the curve may turn before it reaches the level,
     and sqrt(2 error/bend) is the distance at which the bend alone accounts for the error.

@@ -1,4 +1,4 @@
-"""The floating oscillator: two masses, a spring, no support; free and rigid motion in closed form.
+"""Compute the floating oscillator (two masses, a spring, no support) in closed form, in free and in rigid motion.
 
 Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers in this
 module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended mass ``M`` with displacement
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-# in quotes: numpy.typing costs start-up
+# in quotes, because numpy.typing slows the start
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Limits of stiffness and masses: beyond them products and quotients overflow; no unit system comes near.
+# Limits of stiffness and masses: beyond them products and quotients overflow; all unit systems are far from them.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
 class State(NamedTuple):
-    """Displacements ``z`` (frame), ``y`` (suspended mass) and velocities ``vz``, ``vy``; numbers or arrays alike."""
+    """Displacements ``z`` (frame), ``y`` (suspended mass) and velocities ``vz``, ``vy``; numbers or arrays."""
 
     z: Values
     y: Values
@@ -44,7 +44,7 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, z: ArrayLike, y: ArrayLike, vz: ArrayLike, vy: ArrayLike) -> State:
-        """Make a state from anything that numpy accepts as numbers."""
+        """Make a state from anything that numpy converts to numbers."""
         return cls(*(np.asarray(value, dtype=np.float64) for value in (z, y, vz, vy)))
 
 
@@ -163,7 +163,7 @@ class Oscillator:
             return np.asarray(table.ravel()[:count])
 
         def speed(share: float) -> Values:
-            """Return the velocity of the mass with this share of the deformation."""
+            """Return the velocity of the mass that takes this share of the deformation."""
             swing = share * rate * amplitude * turn_row
             table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
             return np.asarray(
@@ -176,7 +176,7 @@ class Oscillator:
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
         for column, value in zip(states, start, strict=True):
-            column[:1] = value  # exactly as given
+            column[:1] = value  # the first value is exactly the given one
         return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
@@ -244,7 +244,7 @@ class Oscillator:
 def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # the quotient of the smallest products has no digits; there two terms of the series are exact
+    # the quotient of the smallest products has no digits; two terms of the series are exact there
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),
@@ -336,7 +336,7 @@ class Replay:
         )
 
     def residual(self) -> float:
-        """Return the energy norm of what the switched run lacks at td, relative to the reference vibration [-]."""
+        """Return the energy norm of the vibration that the switched run lacks at td, relative to the reference [-]."""
         reference = self.reference(self.td)
         lack = compute_lacking_energy(self.oscillator, reference, self.motion(self.td))
         return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))

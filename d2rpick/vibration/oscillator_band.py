@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 # Half-width of the band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
-# Effect of the hidden share if it consists of harmonics of a nonlinear spring: between the peaks, which stay in step,
-# R is off by up to half of the product of this factor and the share.
+# Effect of a hidden share that consists of harmonics of a nonlinear spring.
+# R is wrong by up to half of the product of this factor and the share, even between the peaks.
 _HARMONIC_COUNTS: Final = 8.0
 
 
 def residual_band(
     fit: Identification, stated: Samples, tr: Samples, td: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
-    """Return the residual of each tr (n,), and the lowest and highest that the record allows [-].
+    """Return the residual of each tr (n,) with its lower and upper bound [-].
 
     If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
     exact.  A hidden mode is in opposite phase in the worst case, and absent in the best; if it may hold more than any
@@ -58,7 +58,7 @@ def residual_band(
 
 
 def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a hidden mode at one end of its swing at tr and at the other at td, with its damping [-]."""
+    """Return R^2 of a hidden damped mode that has opposite extremes at tr and td [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
 
@@ -86,7 +86,7 @@ def _compute_deviation(
 
 
 def _move_parameters(mode: Mode, step: Samples) -> Mode:
-    """Return a mode whose first parameters are changed by a ``step`` of shape (p,)."""
+    """Return a mode with its first parameters changed by a ``step`` of shape (p,)."""
     parameters = np.array(
         [
             mode.omega,

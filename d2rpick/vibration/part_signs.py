@@ -1,4 +1,4 @@
-"""Determine the deformation of each part with its sign: confirmed by waves, else by a mode of its own."""
+"""Determine the signed deformation of each part: from zeros confirmed by waves, else from a mode of its own."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.measures import Profile
+from d2rpick.vibration.modes import SOLVER_FLOOR
 from d2rpick.vibration.span import SMALLEST, estimate_hidden_share
-from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, find_all_zeros, follow_waves
 
 if TYPE_CHECKING:
@@ -24,26 +24,26 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A mode fitted to one part can imitate the cross terms between modes in its energy: it must leave this much less.
+# A mode fitted to one part can imitate products of other modes: its misfit must be below this share of theirs.
 _CLEARLY = 0.5
 
-# A deformation that swings about zero has a mean of zero. Beyond this share of its mean size it swings about a preload
-# or plastic work, and its sign at a zero of the energy means nothing.
+# A deformation that oscillates about zero has a mean of zero. Beyond this share of its mean size it oscillates about
+# a preload or plastic work, and a zero of the energy does not give its sign.
 _MOST_OFF_CENTRE = 0.5
-# Parts without a sign are left out if they hold less than this share of the energy: D changes by at most 0.2, the
-# default tolerance.
+# Parts without a sign are left out if they have less than this share of the energy.
+# Then D changes by at most 0.2, the default tolerance.
 MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = (
     "no few modes have its energy, with the signs that its minima give or on their own"
 )
-# The named parts make up this share of the mismatch.
+# The named parts have this share of the mismatch.
 _NAMED_TOGETHER = 0.8
 
 
 def find_own_mode(
     time: Samples, energy: Samples, followed: PartMotion | None
 ) -> PartMotion | None:
-    """Return the motion of one mode for a part if it describes the energy and leaves clearly less than ``followed``."""
+    """Return the motion of a single mode of a part if its misfit is clearly below that of ``followed``."""
     fit = identify(time, energy, quick=True)
     if fit.mode is None or not _is_pure_vibration(fit):
         return followed
@@ -54,7 +54,7 @@ def find_own_mode(
 
 
 def _is_pure_vibration(fit: Identification) -> bool:
-    """Return True if a fit has no plastic rest or preload, which may be a second plane at a similar rate."""
+    """Return True if a fit has neither plastic work nor a preload, which may be a second plane."""
     return bool(
         fit.describes_record
         and fit.mode
@@ -63,7 +63,7 @@ def _is_pure_vibration(fit: Identification) -> bool:
 
 
 class PartMatch(NamedTuple):
-    """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
+    """One part: whether its deformation has the same sign at tr and td, and its share of D^2.
 
     Both are None if the part has no sign; ``reason`` says why.
     """
@@ -75,7 +75,7 @@ class PartMatch(NamedTuple):
 
 
 class SignedParts(SignedAmplitudes):
-    """Signed deformations of parts, and what else of their vibration is known.
+    """Signed deformations of parts, and their vibration energies.
 
     Those that hold most are read first.  As soon as too much is known to have no sign, nothing rests on the others, and
     they are read when somebody asks for their names.
@@ -130,13 +130,13 @@ class SignedParts(SignedAmplitudes):
             self.unsigned_share = float(not held.any())
 
     def _roots(self) -> Samples:
-        """Return the roots of the energies, shape (k, n); not stored, since there may be a window for each td."""
+        """Return the roots of the energies (k, n); they are not stored, as there may be a window for each td."""
         return np.sqrt(np.maximum(self._energies.T, 0.0), order="C")
 
     def _by_zeros(
         self, places: Places, roots: Samples
     ) -> Iterator[tuple[int, PartMotion | str]]:
-        """Yield the motion of parts from the zeros of their energy, or the reason why there is none."""
+        """Yield the motion of parts from the zeros of their energy, or the reason why it is unknown."""
         lasting = np.gradient(self.time)
         for i, own_roots in zip(
             places.tolist(), find_all_zeros(self.time, roots[places]), strict=True
@@ -151,7 +151,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def _all(self) -> list[PartMotion | str]:
-        """Return all parts; if too much has no sign, no modes are searched in parts that hold less."""
+        """Return all parts; if too much energy has no sign, the modes of smaller parts are not searched."""
         motions = {
             **self._main,
             **dict(self._by_zeros(self._order[len(self._main) :], self._roots())),
@@ -160,12 +160,12 @@ class SignedParts(SignedAmplitudes):
 
     @property
     def signed(self) -> bool:
-        """Return True if parts with a sign hold enough of the energy."""
+        """Return True if the parts with a sign have enough of the energy."""
         return self.unsigned_share <= MOST_UNSIGNED
 
     @property
     def told(self) -> str:
-        """Return the parts that a choice rests on, in words."""
+        """Return a description of the parts on which a choice is based."""
         return f"parts, signs of {', '.join(self.names)}"
 
     @cached_property
@@ -179,12 +179,12 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
-        """Return the motion of each part that has a sign; the overall sign of a deformation is arbitrary."""
+        """Return the motion of each part with a sign; the common sign of all is arbitrary."""
         return tuple(motion for motion in self._all if isinstance(motion, PartMotion))
 
     @property
     def unsigned(self) -> tuple[PartMatch, ...]:
-        """Return the parts that were left out."""
+        """Return the parts without a sign."""
         all_parts = zip(self._names, self._all, strict=True)
         return tuple(
             PartMatch(name, None, None, why)
@@ -194,7 +194,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def owner(self) -> Places:
-        """Return the index in ``names`` of each deformation's part: a part has a deformation for each of its modes."""
+        """Return the part of each deformation as an index in ``names``; a part has one for each of its modes."""
         return np.repeat(
             np.arange(len(self.names)),
             [len(motion.model.amplitudes(0.0)) for motion in self.motions],
@@ -235,7 +235,7 @@ class SignedParts(SignedAmplitudes):
         )
 
     def profile(self, td: float) -> Profile:
-        """Return lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return frozen-deformation errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
@@ -244,14 +244,14 @@ class SignedParts(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,), and its bounds if what may be hidden stood opposed at tr and td [-]."""
+        """Return the residual of each tr (n,), with bounds for hidden energy that is opposed at tr and td [-]."""
         opposed = np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
         squared = np.square(stated)
         hidden = np.square(opposed)
         return measures.band_about(squared, 0.0 * squared, hidden, hidden)
 
     def comparable_since(self, td: float) -> float:
-        """Return the last unclear time before ``td``: from there on signs can be compared with those at td [time]."""
+        """Return the last unclear time before ``td`` [time]; later signs can be compared with that at td."""
         unclear = np.concatenate([motion.unclear for motion in self.motions])
         return float(np.max(unclear[unclear < td], initial=self.time[0]))
 
@@ -259,7 +259,7 @@ class SignedParts(SignedAmplitudes):
 def _explain_no_sign(
     lasting: Samples, deformation: Samples, zeros: Samples
 ) -> str | None:
-    """Return the reason why a deformation, with durations ``lasting`` of its states, does not swing about zero."""
+    """Return the reason why a deformation does not oscillate about zero; ``lasting`` weighs its states."""
     if zeros.size < 2:
         return "the energy does not return to zero: preloaded, yielded or vibrating in many modes"
     offset = abs(float(lasting @ deformation))
@@ -272,7 +272,7 @@ def _explain_no_sign(
 def list_contributions(
     vibration: SignedParts, tr: float, td: float
 ) -> tuple[PartMatch, ...]:
-    """Return the match of each part, the largest share first, then those without a sign."""
+    """Return the match of each part, the largest share first, then the parts without a sign."""
     shares = np.bincount(
         vibration.owner, measures.mismatch_shares(vibration, tr, td)
     ).tolist()
@@ -291,7 +291,7 @@ def list_contributions(
 
 
 def name_main_contributors(matches: Sequence[PartMatch]) -> str:
-    """Return the names of the parts that contribute most.
+    """Return the names of the parts with the largest contributions.
 
     Examples
     --------

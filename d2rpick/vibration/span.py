@@ -1,4 +1,4 @@
-"""Find where one oscillator describes the record: the window around td, grown and fitted repeatedly."""
+"""Find the window around td in which one oscillator describes the record, extended and fitted repeatedly."""
 
 from __future__ import annotations
 
@@ -29,43 +29,43 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
     class Damped(Protocol):
-        """What is fitted to an energy: a mode, or waves whose deformations add up."""
+        """Interface of what is fitted to an energy: a mode, or waves with a common deformation."""
 
         @property
         def alpha(self) -> float:
-            """Damping [1/time]."""
+            """Return the damping [1/time]."""
 
         def energy(self, t: Samples | float) -> Samples:
-            """E [energy]."""
+            """Return E [energy]."""
 
         def vibration_energy(self, t: Samples | float) -> Samples:
-            """V [energy]."""
+            """Return V [energy]."""
 
 
-# Starts of trial windows as shares of the time before td, and ends as shares of the time after it: some window lies in
-# any flight of several periods and fills most of it.
+# Starts of trial windows as shares of the time before td, and ends as shares of the time after td.
+# Any flight of several periods is mostly filled by one of these windows.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Ends before td, as shares of the time before it: td itself may lie in the next contact.
+# Ends before td, as shares of the time before td, because td itself may be in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
-# Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits: each mark is this
-# share of the distance of the next one.
+# Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits.
+# Each mark is at this share of the distance of the next one.
 _MARKS = 0.87
-# A window that an oscillator describes has at least this many periods, and most of the samples it was fitted to: less
-# may be an accident, or a transition in the record.
+# A window that an oscillator describes has at least this many periods and this share of the fitted samples.
+# Less may be an accident, or a transition in the record.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# An inner fit with a scatter below this share of the whole shows that the ends do not belong to the flight.
+# If an inner fit has a scatter below this share of the outer one, the ends do not belong to the flight.
 _MUCH_BETTER = 0.7
-# The record leaves the fitted oscillator if the mean error over 1/25 period (at least three samples) exceeds the
-# largest of: this share of the vibration energy, this many standard errors of such a mean, this many times the
-# systematic rest of the fit. Of a million means of white noise one does so by chance.
+# The record leaves the fitted oscillator if the mean error over 1/25 period exceeds the largest of three limits:
+# this share of the vibration energy, this many standard errors, and this many times the systematic misfit.
+# The mean uses at least three samples; white noise exceeds the limit once in a million means.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# An oscillator that describes this share of the bounds is that of every td in its window: none is sought beside it.
+# An oscillator that describes this share of the bounds is used for every td in its window without further search.
 _MOST_OF_BOUNDS = 0.5
-# Fits of the growing window until it stays; two are usual.
+# Most fits of the growing window; two are usual.
 _MOST_REFITS = 8
 
-# Least share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06, and real
-# solvers leave as much.
+# Smallest share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06.
+# Real solvers have errors of this size.
 SMALLEST: Final = 1e-3
 _MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
 _FINER: Final = 4  # points per line of a spectrum, so that its peak is met
@@ -133,7 +133,7 @@ def find_described_span(
 def find_longest_described(
     history: History, bounds: Span, whole: bool
 ) -> tuple[Span, Identification] | None:
-    """Find a window of most of the ``bounds`` that one oscillator describes; None if none is found.
+    """Find a window with most of the ``bounds`` that one oscillator describes; None if none is found.
 
     It is that of any td in it, whichever is asked for.  Since it holds the middle of the bounds, it is looked for
     there.  One that is not found is found from its td.  ``whole`` as for `find_described_span`.
@@ -181,7 +181,7 @@ def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex
 def _find_reach(
     history: History, bounds: Span, anchor: float, fit: Identification
 ) -> Span | None:
-    """Return the span of a fit, grown from the middle of its window if the anchor lies in that window.
+    """Return the span of a fit, extended from the middle of its window if the anchor lies in that window.
 
     Many td share one span; starting from the middle of the window gives all of them the same span.
     """
@@ -234,7 +234,7 @@ def _find_span_of_mode(
         ahead,
         states_behind,
     )
-    # the mean over ``width`` samples reaches half as far beyond its middle
+    # the mean over ``width`` samples extends half of them beyond its middle
     left_end = 0 if last_before is None else time.size - last_before + width // 2
     right_end = time.size - 1 if first_after is None else first_after - 1 - width // 2
     return (
@@ -246,7 +246,7 @@ def _find_span_of_mode(
 
 @np.errstate(
     over="ignore", invalid="ignore"
-)  # far away, a damped fit grows beyond all numbers
+)  # far from the window, a damped fit overflows
 def _find_first_off(
     time: Samples,
     energy: Samples,
@@ -256,7 +256,7 @@ def _find_first_off(
     behind: int,
     ahead: int,
 ) -> int | None:
-    """Return the index of the first mean, from ``first`` on, that is off by more than allowed.
+    """Return the index of the first mean, from ``first`` on, that exceeds its limit.
 
     The search goes outwards block by block, so that no sum contains the large errors beyond the end that is searched.
     """
@@ -287,7 +287,7 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
 
 
 def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
-    """Windows to try: around td, the longest first, then before td."""
+    """Yield windows to try: around td, the longest first, then before td."""
     start, end = bounds
     beginnings = [
         start,
@@ -323,7 +323,7 @@ def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Sp
 
 
 def _mark(time: float, bounds: Span, after: int = 0) -> float:
-    """Give the last mark that is not after ``time``, or the one ``after`` it; where there is none, the time itself."""
+    """Return the last mark at or before ``time``, or the first ``after`` it; without a mark, return the time."""
     if bounds.end > bounds.start:
         share = (time - bounds.start) / (bounds.end - bounds.start)
     else:
@@ -353,7 +353,7 @@ def _grow_span(
             _LEAST_PERIODS * 2 * np.pi / fit.mode.omega,
             _MOST * (window.end - window.start),
         )
-        # of a period far beyond the record, means over a part of it would be of far more samples than there are
+        # for a period much longer than the record, means would need far more samples than exist
         possible = shortest <= bounds.end - bounds.start
         anchor = min(td, window.end)
         grown = _find_reach(history, bounds, anchor, fit) if possible else None
@@ -361,7 +361,7 @@ def _grow_span(
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            if not fit.describes_record:  # too short, for example
+            if not fit.describes_record:  # for example because the window is too short
                 return None, fit
             return _clear_ends(history, grown, fit, bounds, oscillator, quick=quick)
         span = grown
@@ -378,7 +378,7 @@ def _clear_ends(
     *,
     quick: bool,
 ) -> tuple[Span, Identification]:
-    """Fit the window once more without half a period at the ends where the record leaves it.
+    """Fit the window again without half a period at the ends where the record leaves it.
 
     There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
     samples much better, it determines the window.
@@ -399,7 +399,7 @@ def _clear_ends(
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
-    """Return the share of the vibration energy that a further mode may have in what a model leaves over [-].
+    """Return the share of the vibration energy of a further mode that the misfit may contain [-].
 
     That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
 
@@ -417,11 +417,11 @@ def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> floa
         s, integrate_by_trapezia(s, energy - model.energy(time)), count
     )
     decay = np.exp(-model.alpha * span * (np.arange(count) + 0.5) / count)
-    # from one period in the record to the fastest line that the cells show
+    # from one period in the record to the fastest line that the cells resolve
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     strongest = float(
         np.abs(np.fft.rfft(remainder * decay, _FINER * count))[visible].max()
     )
     amplitude = 2 * strongest / float(np.sum(decay**2))
-    # the energy of a mode swings about a mean by half of its vibration energy
+    # the energy of a mode oscillates by half of its vibration energy about the mean
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)

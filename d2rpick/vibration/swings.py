@@ -1,4 +1,4 @@
-"""Determine the sign of a deformation whose energy comes down to its floor in every swing, for any law of the spring.
+"""Determine the sign of a deformation whose energy returns to its minimum in each half cycle, for any spring law.
 
 Each of these minima is a passage through zero: the energy above the floor is elastic, and its root is the deformation,
 which changes its sign there.  Plastic work raises the floor; heat and drift move it slowly.  If the minima do not lie
@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.measures import Profile, vertices, wrong_sign
+from d2rpick.vibration.modes import SOLVER_FLOOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,30 +23,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turn counts if the energy comes back by this share of its last swing; less is noise, or a faster mode.
+# A turn is counted if the energy returns by this share of its last swing; less is noise or a faster mode.
 _SWING: Final = 0.2
-# A minimum is not on the floor if it lies off the line through its neighbours by this share of the swing.
+# A minimum is above the lower envelope if it deviates from the line through its neighbours by this share.
 _OFF_FLOOR: Final = 0.02
-# If more than this share of the minima are off the floor, those on it are so by chance.
+# If more than this share of the minima deviate, the others lie on the lower envelope by chance.
 _MOST_OFF: Final = 0.1
-_FEWEST: Final = 5  # minima that show a floor
-# Least relative difference in time between a shorter swing and the longer one beside it in a beat.
+_FEWEST: Final = 5  # minima that show a lower envelope
+# In a beat, a shorter half cycle differs from its longer neighbour at least by this share.
 _UNEVEN: Final = 0.03
-# Factor on the residual for any spring: a stiffening spring changes its rate with the amplitude, and over two periods
-# after td its residual was up to 1.5 times that of a linear one, about a preload twice.
+# Factor on the residual for any spring: the rate of a stiffening spring depends on the amplitude.
+# Over two periods after td its residual was up to 1.5 times that of a linear spring, with a preload up to 2 times.
 _OF_ANY_SPRING: Final = 2.0
-# Factor on the root of the hidden share: a mode hidden at its worst changes the residual by 2, but the floor shows less
-# than all of it, 1/6 in one of 300 records of two parts. Of 10,000 random pairs with a second mode 0.1 % exceeded 3
-# times the root by more than 0.05.
+# Factor on the root of the hidden share: a hidden mode changes the residual by at most 2 times that root,
+# but the lower envelope shows only a part of it, 1/6 in one of 300 records of two parts.
+# Of 10,000 random pairs with a second mode 0.1 % exceeded 3 times the root by more than 0.05.
 _OF_THE_FLOOR: Final = 5.0
-
-# Share of the highest energy below which nothing is surely vibration: a solver errs by 1/10 of it at any time.
-SOLVER_FLOOR: Final = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swings(SignedAmplitudes):
-    """The deformation from counted swings, in the states of a flight.
+    """The signed deformation from counted half cycles, in the states of a flight.
 
     Parameters
     ----------
@@ -75,11 +73,11 @@ class Swings(SignedAmplitudes):
         return np.asarray(np.interp(t, self.time, self.deformation))[np.newaxis]
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return the kinetic energy of the vibration: the estimated vibration energy less the elastic one [energy]."""
+        """Return the kinetic energy of the vibration: the estimated vibration energy minus the elastic energy."""
         return np.asarray(self.vibration_energy(t) - self.amplitudes(t)[0] ** 2)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return the energy of the vibration, at least the elastic one [energy]."""
+        """Return the energy of the vibration, which is at least the elastic energy [energy]."""
         return np.asarray(
             np.maximum(self.envelope.vibration_energy(t), self.amplitudes(t)[0] ** 2)
         )
@@ -90,7 +88,7 @@ class Swings(SignedAmplitudes):
         return float(unclear_before[-1] if unclear_before.size else self.time[0])
 
     def known_at(self, td: float) -> bool:
-        """Return True if at least two swings before ``td`` were counted, and more vibrates than the solver's error."""
+        """Return True if at least two half cycles before ``td`` were counted and the energy exceeds solver errors."""
         counted = np.count_nonzero(
             (self.bottoms > self.comparable_since(td)) & (self.bottoms < td)
         )
@@ -99,7 +97,7 @@ class Swings(SignedAmplitudes):
         )
 
     def profile(self, td: float) -> Profile:
-        """Return lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return frozen-deformation errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
@@ -108,7 +106,7 @@ class Swings(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,), and its bounds for any spring, with what may hide in the floor [-]."""
+        """Return the residual of each tr (n,), with bounds for any spring and for modes hidden in the envelope."""
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0)
         )
@@ -117,7 +115,7 @@ class Swings(SignedAmplitudes):
         return stated, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the share of the vibration energy at td that a mode may hide in the floor, for each tr (n,) [-].
+        """Return the share of the vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
 
         It follows from the variation of the floor; a floor of almost nothing hides no more than itself.
         """
@@ -134,7 +132,7 @@ class Swings(SignedAmplitudes):
 
 
 def count_swings(time: Samples, energy: Samples) -> Swings | None:
-    """Count the swings of an energy in free flight; return None if they do not come down to a floor.
+    """Count the half cycles of an energy in free flight; None if they do not return to a common minimum.
 
     Parameters
     ----------
@@ -174,12 +172,12 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
     unclear = np.sort(
         np.concatenate([bottom[is_off_floor], time[[1, open_end]]])
-    )  # a minimum next to the ends is not seen
+    )  # minima next to the ends are not visible
     return Swings(time, deformation, unclear, whole, bottom, floor)
 
 
 def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
-    """Return True if the swings alternate as only the beat of two modes makes them, with rates of 2 to 3 or 2 to 7.
+    """Return True if half cycles alternate as in the beat of two modes with rates 2 to 3 or 2 to 7.
 
     The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
     preload and goes farther there; in a beat the longer swing is the lower one.
@@ -202,10 +200,10 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
 
 
 def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
-    """Return the indices at which the energy turns from one swing into the next, and the last turn seen completely."""
+    """Return the indices at which the energy turns, and the last turn that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    if 4 * turning_points.size > energy.size:  # noise
+    if 4 * turning_points.size > energy.size:  # so many turning points are noise
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
     turns = []
@@ -230,7 +228,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
-    """Return values on straight lines through points, continued beyond the first and the last two of them."""
+    """Return values on straight lines through points, extrapolated from the first two and the last two."""
     first, last = (
         y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
         for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))
@@ -241,7 +239,7 @@ def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
 
 
 def _measure_off_line(x: Samples, y: Samples) -> Samples:
-    """Return how far each of n >= 3 values lies off the line through its neighbours, or the next two at an end."""
+    """Return the distance of each of n >= 3 values from the line through its two nearest neighbours."""
     middle = np.clip(np.arange(x.size), 1, x.size - 2)
     ends = np.arange(x.size) != middle
     left_state = np.where(ends, middle, middle - 1)
@@ -256,7 +254,7 @@ def _measure_off_line(x: Samples, y: Samples) -> Samples:
 
 
 class Envelope(NamedTuple):
-    """An exponential on the highest peaks of an energy: ``energy`` at time ``origin``, falling at ``rate``.
+    """An exponential through the highest peaks of an energy: ``energy`` at time ``origin``, decaying at ``rate``.
 
     Below ``floor`` [energy] it does not exceed the solver's error.
 
@@ -278,7 +276,7 @@ class Envelope(NamedTuple):
 
 
 def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
-    """Find the lowest falling exponential above all peaks, seen from the middle of them; None without peaks.
+    """Find the lowest decaying exponential above all peaks, fitted around their middle; None without peaks.
 
     Parameters
     ----------
@@ -315,7 +313,7 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     )
     (t0, top0), (t1, top1) = hull[max(next_vertex - 1, 0)], hull[next_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
-    if rate <= 0:  # vibration energy only falls: the highest peak bounds it
+    if rate <= 0:  # the vibration energy never rises, so the highest peak bounds it
         return Envelope(float(np.exp(max(top for _, top in hull))), 0.0, middle, floor)
     return Envelope(float(np.exp(top0)), rate, t0, floor)
 

@@ -1,4 +1,4 @@
-"""Determine the sign of a deformation whose square is known: its zeros, and a few damped waves that confirm them.
+"""Determine the sign of a deformation from its square: its zeros, confirmed by a few damped waves.
 
 The root of a part's energy is proportional to its deformation except for the sign, which changes where the energy
 passes through zero.  In a record no energy is exactly zero.  But the deformation is smooth: at a zero the root has a
@@ -30,44 +30,41 @@ if TYPE_CHECKING:
     Complex = NDArray[np.complex128]
     Places = NDArray[np.intp]
 
-# Most waves; more would describe almost any record.
+# Largest number of waves; more would fit almost any record.
 _MOST: Final = 6
-# Most samples in which rates are searched, since the work grows with the third power; fewer than 36 show too little for
-# six waves.
+# Most samples for a search of rates, since the work grows with the third power.
+# With fewer than the second number of samples six waves cannot be found.
 _MOST_SAMPLES, _LEAST_SAMPLES = 400, 36
-# Fewer waves are as good if they leave at most 1.5 times what more waves leave; below 1e-12 all is rounding.
+# Fewer waves are preferred if their misfit is at most 1.5 times that of more waves; below 1e-12 all is rounding.
 _AS_GOOD, _ROUNDING = 1.5, 1e-12
 # Eigenvalues of a matrix of products below this share of the largest are rounding.
 _ROUNDING_OF_SQUARES: Final = 1e-14
 # Largest exponent: outside the fitted record a decay grows backwards without end.
 _LARGEST_EXPONENT: Final = 100.0
 
-# One choice of the sign must be this many times smoother. At 24 samples per period of a chain of two springs the least
-# clear of 35 minima has 2.5, usual ones 5 to 60.
+# One choice of the sign must be this many times smoother than the other.
+# For a chain of two springs at 24 samples per period the least clear of 35 minima had 2.5, usual ones 5 to 60.
 _SMOOTHER = 2.0
-# Every second sample is left out repeatedly while minima are unclear: in fine output the solver's error, 1e-5 of the
-# highest energy, hides a zero. Minima keep at least this many samples between them.
+# While minima are unclear, every second sample is dropped: solver errors hide zeros in fine output.
+# Minima keep at least this many samples between them.
 _LEAST_APART = 8
-# Samples of parts that are processed together, so that they stay in the processor's cache.
+# Samples of parts that are processed together, so that they fit into the cache of the processor.
 _TOGETHER = 1 << 14
-# Signs of five samples about a minimum if the deformation turns nowhere, just before the minimum, or just after it.
+# Signs of five samples around a minimum if the sign changes nowhere, just before the minimum, or just after it.
 _TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
-# Largest share of the energy that waves may leave: a wrong sign at one of thirty minima leaves 10 times as much, noise
-# of 0.5 % of the highest energy 1/10.
+# Largest misfit of the waves as a share of the energy: a wrong sign at one of thirty minima gives 10 times as much.
+# Noise of 0.5 % of the highest energy gives 1/10 of it.
 _MOST_LEFT: Final = 0.01
-# A second plane with this share of the energy hides zeros, or makes false ones.
+# A second plane with this share of the energy hides zeros or produces false ones.
 _MOST_HIDDEN: Final = 0.01
-# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear: the record
-# differs there or is lost in noise.
+# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear.
 _OFF: Final = 0.2
-_MOST_OFF: Final = 0.5  # of the samples
-_ROUNDS: Final = (
-    4  # repetitions in which the fitted stretch comes to contain all clear times
-)
+_MOST_OFF: Final = 0.5  # largest share of the samples with an unclear sign
+_ROUNDS: Final = 4  # repetitions until the fitted window contains all clear times
 
 
 class Waves(NamedTuple):
-    r"""A signed deformation, the sum of the modes that meet in one part.
+    r"""A signed deformation as the sum of modes in one part.
 
     .. math:: q(t) = \mathrm{Re} \sum_i w_i e^{\lambda_i (t - t_0)}
 
@@ -119,7 +116,7 @@ class Waves(NamedTuple):
 
 
 def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
-    """Fit as few waves as describe a deformation nearly as well as six do; return None if nothing swings.
+    """Fit as few waves as describe a deformation nearly as well as six; None if nothing oscillates.
 
     Parameters
     ----------
@@ -175,17 +172,19 @@ def _find_leading_space(windows: Samples, order: int) -> Samples:
 def _fit(
     space: Samples, step: float, time: Samples, deformation: Samples
 ) -> tuple[float, Waves] | None:
-    """Return the remaining sum of squares and the waves whose windows span ``space``, an orthonormal basis."""
+    """Return the sum of squared misfits and the waves whose windows span ``space``, an orthonormal basis."""
     rates = np.log(find_factors(space)) / step
-    rates = rates[rates.imag > np.abs(rates.real)]  # a faster decay is no vibration
+    rates = rates[rates.imag > np.abs(rates.real)]  # a faster decay is not a vibration
     if not rates.size:
         return None
     rates = (
         np.minimum(rates.real, 0.0) + 1j * rates.imag
-    )  # noise lets a free vibration grow
+    )  # noise may make a free vibration grow
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
-    weight = np.abs(deformation)  # an error in the energy is halved in its root
+    weight = np.abs(
+        deformation
+    )  # the root of the energy has half of its relative error
     solution = np.linalg.lstsq(
         basis * weight[:, np.newaxis], deformation * weight, rcond=None
     )[0]
@@ -195,7 +194,7 @@ def _fit(
 
 
 class Zeros(NamedTuple):
-    """Times at which a deformation passes zero, may pass zero, and, near the ends, at which this is not seen."""
+    """Times at which a deformation passes zero or may pass zero, and end ranges in which this is invisible."""
 
     sure: Samples
     doubtful: Samples
@@ -210,7 +209,7 @@ def find_all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
 
 
 def _find_zeros(time: Samples, roots: Samples) -> list[Zeros]:
-    """Find the zeros of each row from every sample, or every second and so on, with the fewest doubtful ones."""
+    """Find the zeros of each row from every sample, every second sample and so on, with the fewest doubtful ones."""
     best = _find_zeros_in(time, roots, _find_minima(roots))
     stride = 2
     unsure = _list_unsure(best, range(len(best)))
@@ -240,9 +239,9 @@ def _list_unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
 def _find_zeros_in(
     time: Samples, roots: Samples, minima: NDArray[np.bool_]
 ) -> list[Zeros]:
-    """Find the zeros of each row from just these samples with these minima."""
+    """Find the zeros of each row from the given samples and minima."""
     row, at = np.nonzero(minima)
-    # two samples on either side show the bend of the root; a minimum nearer to an end remains unknown
+    # two samples on both sides show the curvature of the root; a minimum closer to an end remains unknown
     early = at < 2
     late = at >= time.size - 2
     row_of_zero = row[~early & ~late]
@@ -261,7 +260,7 @@ def _find_zeros_in(
         low, low + high, out=np.full(left_state.shape, 0.5), where=low + high > 0
     )
     sure = time[left_state] + share * (time[left_state + 1] - time[left_state])
-    # a zero beside a minimum near an end may lie one sample further inwards
+    # the zero of a minimum near an end may lie one sample further inwards
     ends = np.append(row[early], row[late])
     unseen = np.append(time[at[early] + 1], time[at[late] - 1])
     order = np.argsort(ends, kind="stable")
@@ -281,13 +280,13 @@ def _split_by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
 
 
 def _find_minima(values: Samples) -> NDArray[np.bool_]:
-    """Return a mask of the local minima in each row: the first of a flat one, and an end below its neighbour."""
+    """Return a mask of the local minima in each row: the first sample of a flat one, and low ends."""
     around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
     return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
 
 
 def _measure_bends(times: Samples, values: Samples) -> Samples:
-    """Return the largest second difference of the slopes in each row of five samples, for any number of tables."""
+    """Return the largest second difference of slopes in each row of five samples, for any number of tables."""
     slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
     return np.asarray(
         np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0)
@@ -295,7 +294,7 @@ def _measure_bends(times: Samples, values: Samples) -> Samples:
 
 
 class PartMotion(NamedTuple):
-    """A ``model`` of a part's vibration, the times at which it is ``unclear`` [time], and its ``hidden`` share.
+    """A ``model`` of the vibration of a part, the times at which it is ``unclear``, and its ``hidden`` share.
 
     That is the share of the vibration energy that a further mode may have unseen [-].
     """
@@ -306,7 +305,7 @@ class PartMotion(NamedTuple):
 
 
 def follow_waves(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
-    """Compare a deformation with waves, which are fitted where it is clear and decide the doubtful signs.
+    """Compare a deformation with waves fitted to its clear times, which decide the doubtful signs.
 
     Parameters
     ----------
@@ -333,7 +332,7 @@ def follow_waves(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | 
         modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
         missed = _average_around(miss, width) > _OFF * waves.vibration_energy(time)
-        # also beside it, where the mean still contains much that is right
+        # also next to it, where the mean still contains many correct values
         is_missed = _average_around(missed.astype(np.float64), width) * width > 0.5
         fitted = stretch
         stretch = max(

@@ -790,7 +790,7 @@ def test_a_figure_shows_itself() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0),
             ValueError,
-            "oscillator and v0 go together",
+            "give oscillator and v0 together",
         ),
         (
             lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]),

@@ -76,7 +76,7 @@ def test_a_row_of_another_question_is_not_taken(
     again = Ledger(ledger, question)
     assert again.find(name) is None
     assert again.told(1).endswith(
-        "; 1 have changed, or were computed with other options"
+        "; 1 have changed, or were computed with other options, and are computed again"
     )
 
 

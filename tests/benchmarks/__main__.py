@@ -55,7 +55,7 @@ STARTS = (
 def process_ratio(
     libraries: str, *args: str, env: Mapping[str, str] | None = None
 ) -> float:
-    """Return the processor time of a command over that of a process that only imports the required libraries."""
+    """Return the CPU time of a command over that of a process that only imports the required libraries."""
     own_settings = (THREADS, "PYTHONDONTWRITEBYTECODE")
     clean = {
         name: value

@@ -1,6 +1,6 @@
 """Cost of choosing times for records of engineers: structures with many modes and noise.
 
-All records are synthetic, seeded, and in a temporary folder.  Compared calls take turns.  Times are processor times of
+All records are synthetic, seeded, and in a temporary folder.  Compared calls take turns.  Times are CPU times of
 whole processes, because other work on the machine changes the elapsed time.
 """
 
@@ -180,19 +180,19 @@ def search_to_td(trouble: str, states: int, *command: str) -> float:
 
 
 def wait(trouble: str, states: int, *command: str) -> float:
-    """Return the processor time of a command for a troubled record [s]."""
+    """Return the CPU time of a command for a troubled record [s]."""
     return _measure_cost(
         *command, "--exit-zero", "-q", str(_make_troubled_record(trouble, states))
     )
 
 
 def wait_for_info(trouble: str, states: int) -> float:
-    """Return the processor time of `info` for a troubled record [s]."""
+    """Return the CPU time of `info` for a troubled record [s]."""
     return _measure_cost("info", "-q", str(_make_troubled_record(trouble, states)))
 
 
 def wait_for_parts(parts: int) -> float:
-    """Return the processor time of `explore` for this number of parts and 2000 states [s]."""
+    """Return the CPU time of `explore` for this number of parts and 2000 states [s]."""
     names = (
         "--part",
         f"2001-{2000 + parts}",
@@ -222,7 +222,7 @@ def explore_memory() -> float:
 
 
 def study_of_small_runs() -> float:
-    """Return the processor time per run of `study` for 1000 csv of 1501 states in one process [ms]."""
+    """Return the CPU time per run of `study` for 1000 csv of 1501 states in one process [ms]."""
     folder = Path(_folder.name) / "small runs"
     if not folder.exists():
         folder.mkdir()
@@ -477,7 +477,7 @@ def _write_runs() -> list[str]:
 
 
 def _measure_cost(*command: str) -> float:
-    """Return the processor time of a command, the smaller of two [s]."""
+    """Return the CPU time of a command, the smaller of two [s]."""
     return min(
         measure_processor_seconds(lambda: read_output("-m", "d2rpick", *command))
         for _ in range(2)
@@ -487,7 +487,7 @@ def _measure_cost(*command: str) -> float:
 def _compare_processes(
     ours: Sequence[str], reference: Sequence[str], rounds: int = _ROUNDS
 ) -> float:
-    """Return the processor time of one process over that of another, in turns."""
+    """Return the CPU time of one process over that of another, in turns."""
     return measure_ratio(
         lambda: read_output(*ours),
         lambda: read_output(*reference),

@@ -1,21 +1,26 @@
-"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
+"""Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers TABLE``.
 
 Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
-of `deciding_questions` that run through code with this constant are asked again.  The table shows how many answers
-changed.  A constant that changes no answer is not needed, or needs a question of its own.
+of `deciding_questions` that run through code with this constant are asked again, one of each kind first.  The table
+docs/developing/deciding-numbers.csv shows how many answers changed; constants that have changed no answer so far, or
+have another value, are tried again.  A constant that changes no answer is a guard against round-off, overflow or
+damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not needed.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import importlib
 import multiprocessing
 import pkgutil
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,6 +35,14 @@ PACKAGES: Final = ("vibration", "flight", "choice")
 FACTORS: Final = (0.5, 2.0)
 # This number of changed answers shows that a constant decides; no further questions are asked.
 ENOUGH: Final = 3
+
+_HEAD: Final = (
+    "constant",
+    "value",
+    "changed when halved",
+    "changed when doubled",
+    "what it decides",
+)
 
 Number = float | int | tuple[float, ...]
 # A function of a file, by the name of the file and the line of its definition.
@@ -51,6 +64,20 @@ class Baseline(NamedTuple):
     answer: str
     seconds: float
     places: frozenset[Place]
+
+
+class Row(NamedTuple):
+    """Result for a constant: its name without the package, its value, and the counts of changed answers as text."""
+
+    name: str
+    value: str
+    halved: str
+    doubled: str
+
+    @property
+    def decides(self) -> bool:
+        """Return True if an answer changed."""
+        return any(not text.startswith("0 of") for text in (self.halved, self.doubled))
 
 
 class Outcome(NamedTuple):
@@ -257,6 +284,15 @@ def _list_functions(module: ModuleType) -> Iterator[FunctionType]:
                     yield member
 
 
+def order_by_kind(names: Sequence[str], baselines: Mapping[str, Baseline]) -> list[str]:
+    """Order questions so that one of each kind comes first, the quickest, then the next of each kind."""
+    by_kind: dict[str, list[str]] = defaultdict(list)
+    for name in sorted(names, key=lambda name: baselines[name].seconds):
+        by_kind[name.split()[0]].append(name)
+    rounds = zip_longest(*by_kind.values())
+    return [name for round_names in rounds for name in round_names if name]
+
+
 def try_factor(
     modules: Sequence[ModuleType],
     constant: Constant,
@@ -265,10 +301,10 @@ def try_factor(
     baselines: Mapping[str, Baseline],
     seconds: float,
 ) -> Outcome:
-    """Ask the questions that run through the users of a constant, the quickest first, with the constant scaled."""
+    """Ask the questions that run through the users of a constant, with the constant scaled, until it surely decides."""
     users = find_users(modules, constant)
     touched = [name for name in questions if users & baselines[name].places]
-    touched.sort(key=lambda name: baselines[name].seconds)
+    touched = order_by_kind(touched, baselines)
     patch_constant(modules, constant, factor)
     asked_count = changed = 0
     start = time.process_time()
@@ -297,18 +333,43 @@ def call_in_child(function: Callable[[], Any]) -> Any:
     return result
 
 
-def print_row(constant: Constant, outcomes: Sequence[Outcome]) -> None:
-    """Print a row of a Markdown table."""
+def count_outcomes(constant: Constant, outcomes: Sequence[Outcome]) -> Row:
+    """Return the row of a constant that was tried."""
     module = constant.module.removeprefix("d2rpick.")
-    value = f"{constant.value}"
     counts = [f"{outcome.changed} of {outcome.asked}" for outcome in outcomes]
-    row = (f"`{module}.{constant.name}`", value, *counts, constant.comment)
-    print("| " + " | ".join(row) + " |", flush=True)
+    return Row(f"{module}.{constant.name}", f"{constant.value}", *counts)
+
+
+def read_table(path: Path) -> dict[str, Row]:
+    """Return the tried rows of an earlier table by the names of their constants; empty without a table."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))[1:]
+    return {line[0]: Row(*line[:4]) for line in lines if line[2]}
+
+
+def write_table(
+    path: Path, constants: Sequence[Constant], rows: Mapping[str, Row]
+) -> None:
+    """Write the table of all constants: those that decide an answer, the others, and those that were not tried."""
+    lines = []
+    for constant in constants:
+        name = f"{constant.module.removeprefix('d2rpick.')}.{constant.name}"
+        row = rows.get(name, Row(name, f"{constant.value}", "", ""))
+        rank = 2 if not row.halved else int(not row.decides)
+        lines.append((rank, [*row, constant.comment]))
+    lines.sort(key=lambda line: line[0])
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_HEAD)
+        writer.writerows(cells for _, cells in lines)
 
 
 def main() -> None:
-    """Try each constant, and print the table."""
+    """Try each constant, and write the table."""
     parser = argparse.ArgumentParser(description="Which constants decide an answer.")
+    parser.add_argument("table", type=Path, help="CSV file; deciding rows stay")
     parser.add_argument("--records", type=int, default=2, help="records of each class")
     parser.add_argument("--seed", type=int, default=1, help="seed of the records")
     parser.add_argument(
@@ -318,36 +379,34 @@ def main() -> None:
     options = parser.parse_args()
     modules = import_modules()
     constants = find_constants(modules)
+    rows = read_table(options.table)
     with TemporaryDirectory() as folder:
         questions = make_questions(options.records, options.seed, Path(folder))
         baselines = call_in_child(lambda: measure_baselines(questions))
-        total = sum(baseline.seconds for baseline in baselines.values())
-        print(
-            f"{len(constants)} constants, {len(questions)} questions, {total:.0f} s\n"
-        )
-        print(
-            "| constant | value | changed when halved | when doubled | what it decides |"
-        )
-        print("| --- | --- | --- | --- | --- |")
         for constant in constants:
             full_name = f"{constant.module}.{constant.name}"
-            if options.names and not any(part in full_name for part in options.names):
+            row = rows.get(full_name.removeprefix("d2rpick."))
+            is_known = row and row.decides and row.value == f"{constant.value}"
+            is_named = not options.names or any(
+                part in full_name for part in options.names
+            )
+            if is_known or not is_named:
                 continue
-            outcomes = [
-                call_in_child(
-                    partial(
-                        try_factor,
-                        modules,
-                        constant,
-                        factor,
-                        questions,
-                        baselines,
-                        options.seconds,
-                    )
+            trials = [
+                partial(
+                    try_factor,
+                    modules,
+                    constant,
+                    factor,
+                    questions,
+                    baselines,
+                    options.seconds,
                 )
                 for factor in FACTORS
             ]
-            print_row(constant, outcomes)
+            row = count_outcomes(constant, [call_in_child(trial) for trial in trials])
+            rows[row.name] = row
+            write_table(options.table, constants, rows)
 
 
 if __name__ == "__main__":

@@ -111,7 +111,7 @@ def to_loop(task: str) -> float:
 
 
 def troubled_to_loop(trouble: str) -> float:
-    """Return the processor time of checking a deck with 20,000 faults over that of a loop over its lines."""
+    """Return the CPU time of checking a deck with 20,000 faults over that of a loop over its lines."""
     numbers = range(10, 20_010)
     deck = {
         "parts on one card": "*PART\n"
@@ -145,7 +145,7 @@ def check_to_dynars() -> float | None:
 
 
 def many_to_parse() -> float:
-    """Return the processor time of checking 1000 small decks by command over that of finding their cards."""
+    """Return the CPU time of checking 1000 small decks by command over that of finding their cards."""
     with TemporaryDirectory() as folder:
         names = [str(Path(folder) / f"{number}.k") for number in range(1000)]
         for name in names:

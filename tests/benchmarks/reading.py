@@ -86,7 +86,7 @@ def _find_first_version() -> Path | None:
 
 
 def suggest_to_first() -> float | None:
-    """Return the processor time of `suggest` for 1e5 states of one oscillator over that of version 0.6.0."""
+    """Return the CPU time of `suggest` for 1e5 states of one oscillator over that of version 0.6.0."""
     then, time = _find_first_version(), np.linspace(0, 9, _STATES)
     if then is None:
         return None
@@ -108,7 +108,7 @@ def suggest_to_first() -> float | None:
 
 
 def glstat_to_first() -> float | None:
-    """Return the processor time of reading 1e5 states of glstat over that of version 0.6.0; None without history."""
+    """Return the CPU time of reading 1e5 states of glstat over that of version 0.6.0; None without history."""
     then = _find_first_version()
     if then is None:
         return None
@@ -256,7 +256,7 @@ def csv_to_loadtxt() -> float:
 
 
 def csv_to_pandas(columns: int) -> float:
-    """Return the processor time of reading two columns of a csv of 1e6 rows over that of pandas for all columns."""
+    """Return the CPU time of reading two columns of a csv of 1e6 rows over that of pandas for all columns."""
     import pandas as pd
 
     file = _write_csv(_ROWS, columns)

@@ -26,14 +26,14 @@ def measure_seconds(call: Callable[[], object]) -> float:
 
 
 def measure_own_seconds(call: Callable[[], object]) -> float:
-    """Return the processor time of this process for a call [s]."""
+    """Return the CPU time of this process for a call [s]."""
     start = process_time()
     call()
     return process_time() - start
 
 
 def measure_processor_seconds(call: Callable[[], object]) -> float:
-    """Return the processor time of the child processes of a call [s]."""
+    """Return the CPU time of the child processes of a call [s]."""
     usage_before = getrusage(RUSAGE_CHILDREN)
     call()
     usage_after = getrusage(RUSAGE_CHILDREN)

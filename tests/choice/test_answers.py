@@ -162,7 +162,7 @@ def test_the_sign_is_judged_before_the_tolerance() -> None:
         Settings(tolerance=1.0),
     )
     assert judged.tr_ok is False
-    assert judged.reasons == ("opposite sign of the deformation",)
+    assert judged.reasons == ("at tr the deformation has the opposite direction",)
 
 
 def test_verify_measures_what_suggest_measures() -> None:

@@ -66,7 +66,7 @@ def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
 
 
 def test_a_run_without_switching_is_needed() -> None:
-    with pytest.raises(ConfigurationError, match="no leg without rigid parts"):
+    with pytest.raises(ConfigurationError, match="no run without rigid parts"):
         fit_weights([make_leg(ALL, 10)])
 
 
@@ -152,7 +152,7 @@ def test_folders_that_say_nothing_are_refused(tmp_path: Path) -> None:
         read_observations(str(folder))
     for name in ("TEST_0001.out", "TEST_0002.out"):
         (folder / name).unlink()
-    with pytest.raises(FormatError, match="nothing says what the run took"):
+    with pytest.raises(FormatError, match="no file contains the CPU time of the run"):
         read_observations(str(folder))
 
 
@@ -166,7 +166,9 @@ def test_a_run_that_is_given_twice_counts_once(tmp_path: Path) -> None:
         assert observations == once
         assert [caution.code for caution in cautions] == ["same-leg-twice"] * 2
         assert (
-            "has the content of" if again == str(copy) else "is given twice; it counts"
+            "has the content of"
+            if again == str(copy)
+            else "is given twice; it is used once"
         ) in cautions[0].message
     (copy / "TEST_0002.out").write_text(write_listing(200, 0.8e-3, 1.3e-3))
     observations, cautions = read_observations_of_runs([str(folder), str(copy)])

@@ -129,7 +129,7 @@ def test_solids_whose_stresses_do_not_turn_are_told_of_the_parts_in_question(
         good.name,
     )
     assert (
-        "part 1: the stresses of these solids do not turn"
+        "part 1: the stresses of these solids do not rotate"
         in list_doubts(deck, 1)["stresses-unturned"].message
     )
     assert list_doubts(deck, 7) == {}
@@ -288,7 +288,7 @@ def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) 
     )
     page = tmp_path / "page.html"
     run(*arguments, "--deck", foreign, "--report", str(page))
-    assert "nothing of the deck is used" in page.read_text("utf-8")
+    assert "the deck is not used" in page.read_text("utf-8")
     assert "of the reference's run time" not in page.read_text("utf-8")
 
 
@@ -306,7 +306,7 @@ def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
             MATSUM,
         ),
     ):
-        assert "nothing of the deck is used" in read_refusal(*command)
+        assert "the deck is not used" in read_refusal(*command)
     assert not (tmp_path / "next").exists()
 
 

@@ -137,9 +137,9 @@ def test_info_lists_the_flights_that_plan_and_suggest_choose_from(
         ("rollover_box.binout", None),
         (
             "rollover_box.glstat",
-            "*DATABASE_MATSUM, with the DT of *DATABASE_GLSTAT: only momenta of the parts show",
+            "*DATABASE_MATSUM, with the DT of *DATABASE_GLSTAT: only part momenta show",
         ),
-        ("rollover_box.csv", "LS-DYNA: *DATABASE_MATSUM): only momenta"),
+        ("rollover_box.csv", "LS-DYNA: *DATABASE_MATSUM): only part momenta"),
         (
             "energy.csv",
             "LS-DYNA: *DATABASE_MATSUM), at least columns x_momentum, y_momentum, z_momentum of the model:",

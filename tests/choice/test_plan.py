@@ -241,7 +241,7 @@ def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> No
 def test_a_run_that_was_not_switched_is_not_taken_for_one(
     reference: Reference, plan: RunPlan
 ) -> None:
-    with pytest.raises(RangeError, match="said to be done"):
+    with pytest.raises(RangeError, match="a window that `done` names"):
         plan_run(reference, PLAIN, done=plan.windows)
     with pytest.raises(RangeError, match="outside the record"):
         plan_run(reference, PLAIN, done=[(0.1, 9.0)])

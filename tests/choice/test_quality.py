@@ -197,7 +197,7 @@ def test_the_energy_alone_says_nothing_of_the_vibration() -> None:
     answer = suggest_in_history(record, at_a_peak, Settings(replay=False, after=0.005))
     (reason,) = require(answer.quality).reasons
     assert reason.startswith(
-        "how the deformations at tr and td lie to each other is unknown"
+        "it is unknown whether the parts are deformed in the same direction at tr and td"
     )
     assert require(answer.quality).motion == Grade("good")
 
@@ -209,7 +209,7 @@ def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
-        (np.sin(40 * np.linspace(0, 1, 400)), "falls below zero"),
+        (np.sin(40 * np.linspace(0, 1, 400)), "becomes negative"),
         (1 + 0.3 * np.sin(np.linspace(0, 1, 400) * 400), "states per period"),
     ],
     ids=["a velocity", "a coarse output"],

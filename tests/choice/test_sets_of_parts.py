@@ -107,7 +107,7 @@ def rank_sets_of_variant(folder: Path, *changes: tuple[str, str]) -> Parts:
         ([(STEP, "step\n         2         2         3"), ("*END", "*MAT_FABRIC\n         3\n*END")], "airbag fabric"),
         ([(STEP, "step\n         2         2         3"), ("*END", "*MAT_NULL\n         3\n*END")], "void material"),
         ([("*ELEMENT_SHELL", "*ELEMENT_SHELL\n*SECTION_SOLID\n         9         1\n*ELEMENT_SHELL"),
-          (STEP, "step\n         2         9         1")], "do not turn"),
+          (STEP, "step\n         2         9         1")], "do not rotate"),
     ],
 )  # fmt: skip
 def test_a_part_that_must_stay_deformable_is_kept_with_the_reason(
@@ -139,7 +139,9 @@ def test_elements_in_a_file_that_is_missing_are_not_taken_for_none(
         tmp_path, ("\n*SECTION_SHELL", part), ("*END", "*INCLUDE\nmesh.k\n*END")
     )
     assert part_answer.rows[3].verdict == "unknown"
-    assert "not in what was read of the deck" in part_answer.rows[3].reasons[0]
+    assert (
+        "not in the files of the deck that were read" in part_answer.rows[3].reasons[0]
+    )
     assert part_answer.recommended is None
 
 
@@ -151,7 +153,7 @@ def test_rigid_in_the_deck_but_with_energy_in_the_history_is_not_taken_for_rigid
     )
     assert part_answer.rows[1].verdict == "merge"
     assert (
-        "rigid in the deck, but it has internal energy in the history"
+        "rigid in the deck, but has internal energy in the history"
         in part_answer.rows[1].reasons
     )
 
@@ -385,7 +387,7 @@ def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
     }
     rows = judge_parts(facts._replace(parts=parts_by_id), model)
     assert [part_row.verdict for part_row in rows] == ["switch", "keep", "keep"]
-    assert rows[1].reasons == ("drives the landing alone, at little cost",)
+    assert rows[1].reasons == ("determines the landing alone, and costs little",)
 
 
 def write_separate_step(folder: Path, extra_text: str = "") -> str:
@@ -511,7 +513,7 @@ def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
     (hubs,) = [row for row in part_table["parts"] if row["title"] == "hubs"]
     assert hubs["verdict"] == "keep"
     assert hubs["reasons"] == [
-        "2 pieces that nothing joins, of which one rigid body would be made"
+        "2 disconnected pieces, which LS-DYNA would make one rigid body"
     ]
     arguments = ("suggest", "--no-verify", "--td", "0.05", "--part", "1-9")
     document = run_json(

@@ -54,7 +54,7 @@ def test_every_model_answers_alike() -> None:
             == (vibration.unknown is not None)
             == (not compared.any())
         )
-        # The tolerance limits the lock-in error, if the sign is right.
+        # The tolerance limits the frozen-deformation error, if the sign is right.
         wanted = np.where(
             measured["sign_match"] > 0, measured["lock_in_error"], np.inf
         )[compared]

@@ -85,7 +85,7 @@ def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
         (
             "time,energy\n0,1\n0.05,2\n0.1,3\n0.2,4\n",
             "none",
-            "neither passes its level",
+            "neither reaches its value at td",
         ),
     ],
 )
@@ -251,11 +251,11 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
     assert (common_tr.tr, common_tr.window) == (None, None)
     assert (
         common_tr.reason
-        == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
+        == "no tr is admissible in all of 5 runs; tr = 1.6 is in 3, not in d, e"
     )
     assert (
         compare_rows(10.0, [make_study_row("e")]).common.reason
-        == "no tr is acceptable in the run that was judged"
+        == "no tr is admissible in the run that was judged"
     )
     assert (
         compare_rows(10.0, [make_failed_row("f", OSError())]).common.reason
@@ -397,7 +397,7 @@ def test_different_bases_and_units_are_told() -> None:
         caution.code: caution.message for caution in compare_rows(10.0, rows).cautions
     }
     assert messages == {
-        "mixed-units": "the times of the runs have different units, td has only one: not named in 2 runs, ms in 1 run",
+        "mixed-units": "the runs have different units of time, but td has only one: not named in 2 runs, ms in 1 run",
         "mixed-bases": "the basis of the choice differs between the runs: oscillator in 2 runs, energy in 1 run",
         "energy-only": "in 1 of 3 runs: b",
     }

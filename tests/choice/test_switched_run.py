@@ -64,6 +64,8 @@ def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
     codes_expected = {None: [], True: ["rigid-times"], False: ["partly-rigid"]}[done]
     assert [caution.code for caution in cautions] == codes_expected
     if done is False:
-        assert "these parts were rigid: engine; others deform" in cautions[0].message
+        assert (
+            "these parts were rigid: engine; the others deform" in cautions[0].message
+        )
     # If a rigid body has taken over the momenta, those of its parts show no flight.
     assert (history.evidence is reference.history.evidence) == (done is None)

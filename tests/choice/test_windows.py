@@ -260,7 +260,7 @@ def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
     history, _ = make_touched_body(0.5)
     answer = suggest_in_history(history, 0.59, Settings())
     messages = {caution.code: caution.message for caution in answer.cautions}
-    assert "stays below 1 % of the largest one" in messages["grazing-contact"]
+    assert "is at first below 1 % of its maximum" in messages["grazing-contact"]
     assert "grazing-contact" not in {
         caution.code
         for caution in suggest_in_history(

@@ -78,17 +78,19 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
         "--history",
         BOX,
     )
-    assert ": use with care. How the deformations at tr and td lie" in join_comments(
-        alone.stdout
+    assert (
+        ": use with care. It is unknown whether the parts are deformed"
+        in join_comments(alone.stdout)
     )
     bad = run("card", *OPPOSITE, "--part", "1", "--history", ENERGY)
     assert bad.exit_code == 1
-    assert ": DO NOT USE. Opposite sign of the deformation." in join_comments(
-        bad.stdout
+    assert (
+        ": DO NOT USE. At tr the deformation has the opposite direction."
+        in join_comments(bad.stdout)
     )
     assert "poor-td: 92%" in join_comments(bad.stdout)
     assert (
-        "warning: not-verified: the times as printed: do not use: opposite sign"
+        "warning: not-verified: the times as printed: do not use: at tr the deformation has the opposite direction"
         in bad.stderr
     )
     assert check_pasted(bad) == [(1, 0.0122659, 0.064)]
@@ -219,8 +221,8 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
         run("card", "--solver", *shlex.split(solver), *GOOD).stdout
     )
     for phrase in (
-        "first step at or after",
-        "co-rotating",
+        "first time step at or after",
+        "co-rotational",
         "vibration is lost",
         "a switched run",
     ):
@@ -312,7 +314,7 @@ def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
         == run(*arguments, "merged.k", "--merge", "101").exit_code
         == 0
     )
-    assert "level is that of the whole model" in join_comments(
+    assert "internal energy is that of the whole model" in join_comments(
         Path("alone.k").read_text()
     )
     assert "whole model" not in join_comments(run("card", *GOOD, "--part", "1").stdout)

@@ -502,7 +502,7 @@ def test_the_check_objects_where_verify_does(
         )
         assert ("D2R209" in severities_by_rule) <= (judged["verdict"] == "do not use")
         assert ("D2R202" in severities_by_rule) == any(
-            "opposite sign" in reason for reason in judged["reasons"]
+            "opposite direction" in reason for reason in judged["reasons"]
         )
         assert ("D2R204" in severities_by_rule) == any(
             "end of the load" in reason for reason in judged["reasons"]

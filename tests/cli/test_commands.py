@@ -91,7 +91,8 @@ def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
     alone = run(*pair, "--no-verify", ENERGY)
     assert alone.exit_code == 1
     assert join_wrapped_lines(alone.stdout).startswith(
-        "do not use tr = 0.0128853, td = 0.064 why how the deformations at tr and td lie to each other is unknown"
+        "do not use tr = 0.0128853, td = 0.064 why it is unknown whether the parts are deformed in "
+        "the same direction at tr and td"
     )
 
 
@@ -103,7 +104,7 @@ def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_do
     assert good.stdout.startswith("use     tr = 0.0135867, td = 0.0687534\nwhy     ")
     bad = run_json("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
     assert (bad["verified"], bad["tr_ok"], bad["sign_match"]) == (False, False, False)
-    assert any("opposite sign" in reason for reason in bad["reasons"])
+    assert any("opposite direction" in reason for reason in bad["reasons"])
 
 
 # Options of suggest and verify.

@@ -86,7 +86,7 @@ def test_the_sentence_says_what_a_step_changes() -> None:
     assert near.startswith("td = 0.07: residual 0.299; 0.001 earlier (")
     assert "costs 1." in near
     good = run_json("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
-    assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
+    assert good == "td = 0.0687534: residual 0.000; no other td in the range is better"
 
 
 def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
@@ -122,7 +122,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
     )
     assert exploration["step"] is None
     assert exploration["answer"].endswith(
-        "; no other td in the window has half of it and keeps half of the rigid time"
+        "; no other td in the range halves the error and keeps half of the rigid time"
     )
 
 
@@ -168,7 +168,7 @@ def test_nothing_to_recommend_is_an_objection() -> None:
         ENERGY,
     )
     assert result.exit_code == 1
-    assert "no td in the window has an acceptable tr" in result.stdout
+    assert "no td in the range has an admissible tr" in result.stdout
     assert "no-candidate" in result.stderr
 
 

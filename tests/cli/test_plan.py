@@ -225,7 +225,7 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     assert "basis      energy: nothing vibrates" in others
     assert "flight     from 0 (" in "\n".join(others)
     chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
-    kept = "the same as in the reference: nothing vibrates in the flight up to td"
+    kept = "the same as in the reference run: nothing vibrates in the flight up to td"
     assert f"expect  {kept}\n" in chosen
     card = run(
         "card",
@@ -290,7 +290,7 @@ def test_the_next_window_is_planned_from_the_switched_run(
         *switched,
     ).stdout.splitlines()
     assert [tuple(map(float, line.split())) for line in lines] == [*windows, *new]
-    assert "said to be done" in read_refusal(
+    assert "a window that `done` names" in read_refusal(
         "plan", "-q", *PART, "--done", str(done), *history
     )
 

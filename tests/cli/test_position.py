@@ -265,7 +265,7 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
         warning["code"]: warning["message"] for warning in suggestion["warnings"]
     }
     assert messages["deck-of-another-model"] == (
-        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: nothing of the deck is used; name that of "
+        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: the deck is not used; name that of "
         "the run"
     )
 

@@ -73,8 +73,8 @@ replay --stiffness 1 --mass 1 --beta 1 --t-end 1 --dt 1 | needs a start | --v0 |
 {ONE_COMMAND} --vz0 1 | --v0 and --vz0 exclude each other
 {ONE_COMMAND} --dt 0 | --dt | above 0 was expected
 {ONE_COMMAND} --dt 1e-12 | --dt 1e-12 | 10000000
-{ONE_COMMAND} --tr 0.006 | --tr and --td need each other
-{ONE_COMMAND} --td 0.006 | --tr and --td need each other
+{ONE_COMMAND} --tr 0.006 | give --tr and --td together
+{ONE_COMMAND} --td 0.006 | give --tr and --td together
 {ONE_COMMAND} --tr 0.006 --td 0.005 | --tr 0.006 is not before --td 0.005
 {ONE_COMMAND} -o motion.txt | motion.txt | --write-as: csv, hdf5, glstat, matsum
 replay --stiffness 1 --mass 1 --beta 1 --v0 1 --t-end 1e-308 --dt 1e-308 | exceeds the range of numbers
@@ -105,7 +105,7 @@ parts --deck absent.k {MATSUM} | absent.k
 parts --deck {MATSUM} {MATSUM} | no keyword was found
 parts --energy 1 {MATSUM} | --energy names one energy
 parts --part 77 --deck {SAMPLE} {MATSUM} | no part 77
-parts --part recommended --deck {SAMPLE} {MATSUM} | name a set that it is compared with
+parts --part recommended --deck {SAMPLE} {MATSUM} | name a set to compare
 parts --weights {SAMPLE} --deck {SAMPLE} {MATSUM} | TOML file of weights was expected
 card --part 1 --tr 0.09 --td 0.02 | 0 <= tr < td was expected
 card --tr 0.01 --td 0.02 | needs --part
@@ -143,7 +143,7 @@ check {DECK} --history {ENERGY} --after 7 | --after 7 lies outside the record
 check {DECK} --fail-on info | info
 check {DECK} -f toml | toml
 follow --once --wait 0.002 {CAR} | --wait 0.002 is below
-follow --once {GLSTAT} | neither a momentum nor the energy of contacts
+follow --once {GLSTAT} | neither momenta nor the contact energy
 follow --once --for 3 {CAR} | --once and --for exclude each other
 follow --once --wait 0 {CAR} | --wait
 follow --once --part nobody {CAR} | nobody
@@ -164,7 +164,7 @@ suggest --td 0.37 --part 7 {BOX} | no part 7 | 1 'box', 2 'step', 3 'sled'
 suggest --td 0.37 --part box --flying 7 {BOX} | no part 7 | 1 'box'
 suggest --td 0.37 --part box --energy 1 {BOX} | --energy and --part exclude each other
 plan --part recommended {MATSUM} | --part recommended needs --deck
-plan --part recommended --part 3 --deck {SAMPLE} {MATSUM} | stands for a whole set
+plan --part recommended --part 3 --deck {SAMPLE} {MATSUM} | is a whole set
 suggest --after 0.2 --landing 0.1 {ENERGY} | --landing 0.1 is not after --after 0.2
 suggest --landing 150 {ENERGY} | --landing 150 lies outside the record
 # near misses, in times by a unit
@@ -181,10 +181,10 @@ suggest 64 {ENERGY} | a time is given as --td, a number in the unit of the recor
 suggest 64ms {ENERGY} | a time is given as --td, a number in the unit of the record, 0.064 if that unit is s
 suggest --td 0.064 {ENERGY.replace("energy", "enrgy")} | (did you mean 'energy.csv'?)
 # a box that cannot be computed
-rollover --tr 0.1 | --tr and --td need each other
+rollover --tr 0.1 | give one --td for each --tr
 rollover --tr 0.2 --td 0.1 | is not before
 rollover --tr 0.1 --td 0.2 --tr 0.2 --td 0.3 | --tr 0.2 is not after --td 0.2
-rollover --tr 0.1 --td 0.2 --tr 0.3 | as many
+rollover --tr 0.1 --td 0.2 --tr 0.3 | give one --td for each --tr
 rollover --tilt 10 | --tilt belongs to --drop
 rollover --scan --drop 1 | --scan and --drop exclude each other
 rollover --scan --td 0.3 --td 0.4 | takes one --td

@@ -130,7 +130,7 @@ def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(
     box: Path,
 ) -> None:
     card, messages = print_card(box, "--no-deck")
-    assert "parts-not-joined: no deck of the run was read" in messages
+    assert "parts-not-joined: without a deck of the run" in messages
     assert "error D2R108" in check_with_card(box, card)
     assert (
         "parts-not-joined"

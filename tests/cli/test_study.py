@@ -394,7 +394,9 @@ def test_runs_are_computed_again_after_a_change(
     args = (*STUDY, *runs, "--resume", ledger)
     assert count_taken(args) == ""
     assert count_taken(args) == f"note: 3 of 3 runs reused from {ledger}"
-    changed = "have changed, or were computed with other options"
+    changed = (
+        "have changed, or were computed with other options, and are computed again"
+    )
     assert (
         count_taken((*args, "--tolerance", "0.19"))
         == f"note: 0 of 3 runs reused from {ledger}; 3 {changed}"

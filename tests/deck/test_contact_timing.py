@@ -46,7 +46,7 @@ def test_chatter_between_two_windows_is_waited_for() -> None:
     timing = find_sensor_timing([(0.013, 0.05), (0.0705, 0.12)], PUSHES)
     assert flatten_windows(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
     with pytest.raises(
-        DeckError, match="no wait lets a sensor switch"
+        DeckError, match="no force-free time lets a sensor switch"
     ):  # the short gap from 0.06 to 0.062 stays without a window
         find_sensor_timing([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
@@ -63,7 +63,7 @@ def test_a_flight_without_a_window_is_left_out_by_a_pair_alone() -> None:
 
 
 def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
-    with pytest.raises(DeckError, match="no wait lets a pair"):
+    with pytest.raises(DeckError, match="no force-free time lets a pair"):
         find_pair_timing([(0.22, 0.3)], PUSHES)
     assert flatten_windows(
         find_sensor_timing([(0.22, 0.3)], PUSHES).windows

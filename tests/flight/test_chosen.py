@@ -93,7 +93,7 @@ def test_flights_that_are_given_are_listed_and_td_is_chosen_in_them() -> None:
         0.3,
         0.9,
     )
-    with pytest.raises(RangeError, match="give the end of the load as `after`"):
+    with pytest.raises(RangeError, match="end of the load, give it as `after`"):
         find_longest_flight(make_braked_block(), Settings())
 
 
@@ -110,11 +110,14 @@ def test_a_message_advises_nothing_that_was_given() -> None:
     )
     warnings = find_warnings(history, 0.8)
     assert (
-        "the momentum is that of free flight at td = 0.8, but the internal energy keeps no level"
+        "the momentum is that of free flight at td = 0.8, but the internal energy is not that of a free vibration"
         in warnings["no-free-flight"]
     )
     warnings_with_load_end = find_warnings(history, 0.8, after=0.1)
-    assert "keeps no level" in warnings_with_load_end["flight-sources-disagree"]
+    assert (
+        "is not that of a free vibration"
+        in warnings_with_load_end["flight-sources-disagree"]
+    )
     assert not [
         message for message in warnings_with_load_end.values() if "`after`" in message
     ]

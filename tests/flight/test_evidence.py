@@ -396,7 +396,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     judged = run(*pair).stdout
     assert judged.startswith("use with care")
     assert (
-        "how the deformations at tr and td lie to each other is unknown"
+        "it is unknown whether the parts are deformed in the same direction at tr and td"
         in join_wrapped_lines(judged)
     )
     assert [
@@ -408,7 +408,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
         for w in suggestion["warnings"]
         if w["code"] == "flight-from-energy"
     )
-    assert "left unused for safety" in message
+    assert "are not used, for safety" in message
 
 
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (

@@ -388,7 +388,7 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
 ) -> None:
     suggestion = suggest_in_history(make_energy_table(internal, kinetic), 0.8, PLAIN)
     assert require(suggestion.quality).grade == "poor"
-    assert "by gravity or by another load" in require(suggestion.decision).reason
+    assert "gravity or another load changes" in require(suggestion.decision).reason
     assert suggestion.situation.flight.unknown_load
 
 

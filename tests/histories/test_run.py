@@ -136,7 +136,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
         (5.5, 55),
     ]
     assert (
-        "time steps back once (restart); if legs overlap the newer one is used"
+        "time steps back once (restart); the newer restart segment is used where they overlap"
         in history.notes[0]
     )
 
@@ -148,7 +148,7 @@ def test_a_leg_that_gives_no_state_is_named() -> None:
     )
     assert list_states(history) == [(1, 3), (2, 4)]
     assert (
-        "run1 was not used: a newer leg begins at or before its first time"
+        "run1 was not used: a newer restart segment begins at or before its first time"
         in history.notes
     )
 
@@ -167,7 +167,7 @@ def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
     )
     run = open_contents(radioss_th, bytes(first.data), bytes(second.data))
     assert [part.id for part in run.parts] == [1]
-    assert "only some legs have part 2, which was left out" in run.notes[0]
+    assert "only some restart segments have part 2, which was left out" in run.notes[0]
     with pytest.raises(FormatError, match="no part 2; there are: 1 'box'"):
         run.history(Selection(parts=("2",)))
 

@@ -143,7 +143,10 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     assert "no level at td is matched" in result
     assert "--resume" in read_refusal(*prepare_drive(folder))
     over = run(*prepare_drive(folder, "--resume"))
-    assert f"resumed: legs that are over: {len(legs)}, the last at {END}" in over.stderr
+    assert (
+        f"resumed: {len(legs)} engine runs are done, the last until {END}"
+        in over.stderr
+    )
     assert json.loads(over.stdout)["windows"] == outcome["windows"]
     journal = (folder / "run" / "drive.ndjson").read_text()
     switched = [
@@ -254,7 +257,7 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
         path.write_bytes(b"")
     result = run(*prepare_drive(tmp_path, "--resume"))
     assert (
-        "the restart of the last leg is not whole: the run goes back to 0"
+        "the restart file of the last engine run is incomplete: the run goes back to 0"
         in result.stderr
     )
     check_finished_run(json.loads(result.stdout), tmp_path)
@@ -384,7 +387,7 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
     ).driver(resume=False) as driver:
         assert driver.progress(3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
-        assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
+        assert driver.progress(9.0) == f"engine run 2, rigid: 0.05 to 0.2 of {END:g}"
 
 
 @pytest.mark.parametrize(
@@ -454,7 +457,7 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
 ):
     for contact, reason in (
         (0.13, "less than 4%"),
-        (0.09, "half swings"),
+        (0.09, "half cycles"),
         (0.109, "begins before tr"),
     ):
         legs = make_probes(0.2, contact=contact)
@@ -511,7 +514,7 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
             "/RWALL/PLANE/8",
             "/FUNCT/8",
             [],
-            "strip_0000.rad: no contact and no rigid wall, so nothing",
+            "strip_0000.rad: the deck has no contact and no rigid wall, so nothing",
         ),
         (
             "DEF       MASS\n         1",

@@ -14,6 +14,7 @@ from d2rpick.running.events import Event
 from d2rpick.running.looks import Looks
 from d2rpick.running.watch import Watch
 from tests.command import ROOT
+from tests.histories.test_contact_forces import rcforc
 from tests.made_binout import make_binout
 from tests.written_runs import FALL_WRITERS, WRITERS, Written, as_glstat
 
@@ -49,6 +50,24 @@ def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
         whole.energy, abs=1e-20
     )  # round-off is 0 compared with a landing
     assert np.array_equal(np.concatenate(momenta), whole.momenta[0].values)
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum", "binout", "t01"])
+def test_a_file_that_became_shorter_is_read_as_a_whole_at_whatever_byte_it_ends(
+    tmp_path: Path, form: str
+) -> None:
+    path = Path(FORMS[form](make_falling_masses(), tmp_path))
+    data = path.read_bytes()
+    for share in (0.999, 0.99, 0.6, 0.4):
+        looks = Looks(Selection())
+        path.write_bytes(data)
+        before, _ = looks.new_states([str(path)])
+        path.write_bytes(data[: int(share * len(data))])
+        states, follows = looks.new_states([str(path)])
+        whole, _ = Looks(Selection()).new_states([str(path)])
+        # a binout ends with a table of its contents, without which it has all its states
+        assert follows is bool(whole.time[-1] == before.time[-1])
+        assert states.time.size == (0 if follows else whole.time.size)
 
 
 @pytest.mark.parametrize("changed", ["shorter", "other", "gone"])
@@ -224,6 +243,35 @@ def test_a_run_is_watched_from_a_look_at_a_state_that_is_half_written(
     begun, *_ = Watch([str(path)], Selection()).news()
     assert begun.event == "begun"
     assert begun.seen == pytest.approx(1 - 1 / 400)  # of the last but one state
+
+
+def test_files_of_one_run_that_grow_in_turn_are_read_on_and_forces_are_not(
+    tmp_path: Path,
+) -> None:
+    """One file has always a state that the other one has not yet; an rcforc holds no state of the history."""
+    run, looks = make_falling_masses(), Looks(Selection())
+    contents = {}
+    for form in ("glstat", "matsum"):
+        written = Path(FORMS[form](run, tmp_path))
+        contents[written] = written.read_bytes()
+    forces = tmp_path / "rcforc"
+    forces.write_bytes(rcforc())
+    names = [*map(str, contents), str(forces)]
+    whole = open_run(names).history(Selection())
+    pieces = list[History]()
+    for path, data in contents.items():
+        path.write_bytes(data[: int(0.6 * len(data))])
+    for share in (0.6, 0.7, 0.71, 0.78, 0.85, 0.93, 1.0):
+        for path, data in contents.items():
+            path.write_bytes(data[: int(share * len(data))])
+            states, follows = looks.new_states(names)
+            assert follows is bool(pieces)
+            pieces.append(states)
+        forces.write_text("no forces any more")
+    for number, momenta in enumerate(whole.momenta):
+        values = [piece.momenta[number].values for piece in pieces]
+        assert np.array_equal(np.concatenate(values), momenta.values)
+    assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
 
 
 @pytest.mark.parametrize("relative", [False, True])

@@ -32,7 +32,7 @@ LOADED = make_energy_history(
 
 
 def compute_residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
-    """Return the residuals that follow from the lock-in error and the kinetic fraction."""
+    """Return the residuals that follow from the frozen-deformation error and the kinetic fraction."""
     return residual(lock_in_error(vibration, tr, td), kinetic_share(vibration, td))
 
 
@@ -233,7 +233,7 @@ def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there
     verdict = verify_in_history(LOADED, worst, 7.7, Settings(after=1.0))
     assert not verdict.verified
     assert any(
-        "which a release without any vibration has" in reason
+        "the residual of a release without any vibration" in reason
         for reason in verdict.reasons
     )
 

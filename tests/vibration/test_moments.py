@@ -1,4 +1,4 @@
-"""Candidate times for tr: minima of the lock-in error, and intervals that contain the true time."""
+"""Candidate times for tr: minima of the frozen-deformation error, and intervals that contain the true time."""
 
 from dataclasses import replace
 

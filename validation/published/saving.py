@@ -22,7 +22,7 @@ PICK_UP: Final = (25.5, 6.5)
 # Step while everything is rigid (capped) over that while deformable, 20.00 of 21.54 us.
 _CAPPED: Final = 20.00 / 21.54
 
-# A car of 17 parts on an obstacle of 309 shells, rigid for 96.8 of 240 ms; processor time of OpenRadioss 2026-08, one
+# A car of 17 parts on an obstacle of 309 shells, rigid for 96.8 of 240 ms; CPU time of OpenRadioss 2026-08, one
 # thread.
 _WEIGHTS: Final = Weights()
 _RIGID: Final = 0.0968 / 0.24
@@ -39,7 +39,7 @@ _CAR: Final = {**_BODY, "BT": 258 + 309}
 
 
 class MeasuredRun(NamedTuple):
-    """MeasuredRun whose processor time was measured with and without switching.
+    """MeasuredRun whose CPU time was measured with and without switching.
 
     ``rigid`` are elements by formulation, and their integration points beside those of one layer.
     """

@@ -1,4 +1,4 @@
-r"""Predict the time after td: the mean energy that a pair keeps, and its error relative to the next contact.
+r"""Predict the motion after td: the mean energy that a pair preserves, and its error relative to the next contact.
 
 An elastic energy V that is released at rest is shared equally between internal and kinetic energy.  With the static
 energy S and the vibration energy U of the reference run at td, the ratio of the mean internal energies after td is
@@ -16,6 +16,10 @@ import numpy as np
 
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.warnings import (
+    compute_mean_decay,
+    select_energies_in_flight,
+)
 from d2rpick.flight.margin import compute_energy_of_approach
 from d2rpick.vibration.measures import wrong_sign
 
@@ -23,18 +27,16 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History
 
-# Relative accuracy of vibration energies from spectral lines, swings or signs of parts [-].
+# Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest number of like modes out of step: with m of them the energy has a standard deviation of 1/sqrt(8 m) of their
-# energy. The nodes of a computed car show 100 such modes.
+# Largest number of similar modes with random phases: the energy of m modes has a standard deviation of 1/sqrt(8 m).
+# The nodes of a computed car show 100 such modes.
 _MODES_OUT_OF_STEP: Final = 110
-# Largest exponent of e, near the largest double.
-_LARGEST_EXPONENT: Final = 700.0
-# Means of computed runs exceed the prediction from spectral lines by up to this share [-].
+# Means of computed runs exceed the prediction from spectral lines by at most this share [-].
 _OF_SOLVER: Final = 0.005
-# Fewer states do not show the fluctuation.
+# Fewest states that show a fluctuation.
 _FEWEST_STATES: Final = 8
 
 
@@ -99,13 +101,10 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     bounds = bound_vibration_energy(situation)
     if bounds is None:
         return []
-    time, energy = _select_energies_in_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
-    # share of the mean vibration energy of the flight that damping leaves at td
-    exponents = -situation.flight.damping * (time - situation.td)
-    decay = np.exp(np.minimum(exponents, _LARGEST_EXPONENT))
-    damping_left = 1 / float(np.mean(decay))
-    # half of the vibration energy is the mean above the static energy
+    damping_left = 1 / compute_mean_decay(situation, time)
+    # the mean energy exceeds the static energy by half of the vibration energy
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
@@ -117,7 +116,7 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
 
     No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
     """
-    time, energy = _select_energies_in_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     if time.size < _FEWEST_STATES:
         return None
     since = time - time[0]
@@ -129,17 +128,8 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
     )
 
 
-def _select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
-    """Return times and energies of the flight, up to td if its end is unknown [time], [energy]."""
-    start = situation.flight.start
-    end = situation.flight.end
-    return situation.history.between(
-        np.inf if start is None else start, situation.td if end is None else end
-    )
-
-
 class Worth(NamedTuple):
-    """Energy of the vibration error over that of the next contact, at most [-].
+    """Largest energy of the vibration error relative to that of the next contact [-].
 
     ``contact`` is the energy that the next contact puts into the parts [energy].
     """
@@ -151,7 +141,7 @@ class Worth(NamedTuple):
 def compare_error_with_contact(
     situation: Situation, candidate: Candidate
 ) -> Worth | None:
-    """Compare the vibration error of a pair with the next contact; None if that contact is unknown.
+    """Compare the vibration error of a pair with the energy of the next contact; None if unknown.
 
     The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
     opposite signs.

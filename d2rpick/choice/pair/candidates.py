@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch
 
 
-# Largest number of candidates judged at once: larger arrays are no faster, and noise makes tens of thousands per td.
+# Most candidates that are judged together: larger arrays are no faster, and noise makes tens of thousands per td.
 _MOST: Final = 20_000
-_MORE: Final = 8  # growth of the number of td judged at once: the first may have few candidates, the last many
-# A residual that may be higher by this much gets a note [-].
+_MORE: Final = 8  # growth of the number of td judged together: the first may have few candidates, later ones many
+# A residual that may be larger by this much gets a note [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
@@ -84,7 +84,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """Error that ranks candidates [-]: the residual, on basis "energy" the level error; infinite if unknown."""
+        """Error by which candidates are ranked [-]: the residual, or the level error; infinite if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
@@ -109,7 +109,7 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged:
-    """Times that may serve as tr for one or many td of a record, judged by flight, sign and tolerance.
+    """Candidate times for one or many td of a record, judged by flight, sign and tolerance.
 
     All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``situation_of`` is the
     index into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``,
@@ -126,11 +126,11 @@ class Judged:
     def of(
         cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
     ) -> Judged:
-        """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure counts."""
+        """Measure and judge the ``moments`` of each situation; without a vibration no measure is used."""
         sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
         if len(moments_of_each) == 1:
-            # a noisy record: keep its arrays in memory once
+            # a noisy record has large arrays: keep them once
             moments = moments_of_each[0]
             place = np.broadcast_to(np.int32(0), sizes[0])
         else:
@@ -218,7 +218,7 @@ class Judged:
     def error(self) -> Samples:
         """Error by which the candidates are ranked, as `Candidate.error`, shape (n,) [-]."""
         residual = self.columns["residual"]
-        # The smallest of many uncertain estimates is too optimistic: a wide band counts against a candidate.
+        # The smallest of many uncertain estimates is too optimistic, so a wide band worsens the rank of a candidate.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -262,7 +262,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Lazy sequence of the candidates of one td, in a given order; each is built when it is looked up.
+    """Lazy sequence of the candidates of one td in a given order; each is built on access.
 
     ``order`` has the rows of the candidates in ``judged``; they are ranked if ``ranked`` is True.  ``recommended`` is
     the place of the recommended candidate in ``order``, None without one.
@@ -291,7 +291,7 @@ class Candidates(Sequence[Candidate]):
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The recommended pair, which is quicker to compute than the candidate; None without one."""
+        """The recommended pair, which is computed faster than the candidate; None without one."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
@@ -326,7 +326,7 @@ class Candidates(Sequence[Candidate]):
         if not isinstance(place, slice):
             i = range(len(self))[place]
             return self[i : i + 1][0]
-        # The accuracy of the time is computed only for these, since it takes longer than the choice.
+        # The accuracy of a time takes longer than the choice, so it is computed only on access.
         reach = self.situation.vibration.reach(
             _mark_given_as_matches(
                 self.situation, self.judged.moments.at(self.order[place])
@@ -443,7 +443,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Mark each given tr as a match if a match lies there, since its accuracy does not depend on who names it."""
+    """Mark each given tr that coincides with a match as a match, since it has the same accuracy."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
@@ -486,9 +486,9 @@ def _list_remarks(
 ) -> Iterator[str]:
     """Yield notes on a tr that do not concern its acceptance."""
     if not (measured or situation.vibration.unknown or situation.at_rest):
-        yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
+        yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
     if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
-        # imported here: a table has no parts
+        # imported here: tables have no parts
         from d2rpick.vibration.part_signs import (
             name_main_contributors,
         )
@@ -497,9 +497,9 @@ def _list_remarks(
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:
-        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {measured['timing_tolerance']:.2g}"
+        yield f"tr is known only to ±{reach:.2g}, but its timing tolerance is ±{measured['timing_tolerance']:.2g}"
     if not measured and reach >= situation.history.step:
-        yield "the level lies within the sampling error of an extremum"
+        yield "the target energy is within the sampling error of an extremum"
 
 
 def _describe_position(worst: Off | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Give one verdict on a pair of times, with its reason, the time after td, the worst case, and a better pair.
+"""Give one verdict on a pair, with its reason, the expected and the worst motion after td, and a better pair.
 
 All commands, forms and pages take their words from here, so that none contradicts another.
 """
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Quality
     from d2rpick.choice.pair.situation import Situation
 
-# Cures of a pair that is not admissible: one for any pair, and one for a recommended pair whose finished switched run
-# contradicts the recommendation.
-CHOOSE_ANOTHER: Final = "choose another pair, as d2rpick suggest names it"
+# Cures of a pair that is not admissible: one for any pair,
+# and one for a recommended pair that is contradicted by its finished switched run.
+CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
-    "check that the switched run was switched at these times and differs from the reference run in nothing else; "
+    "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
-# A worst case within this difference of the expected residual is shown as the same [-].
+# A worst case that differs by less from the expected residual is not shown separately [-].
 _ALIKE: Final = 5e-3
 
 
@@ -81,23 +81,22 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
-        if self.quality.reasons:
-            return "; ".join(self.quality.reasons)
-        if self.at_rest:
+        if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
-        return _explain_why_good(self.quality, self.residual)
+        reasons = "; ".join(self.quality.reasons)
+        if not reasons:
+            return _explain_why_good(self.quality, self.residual)
+        return f"{reasons}{_explain_raised_grade(self.quality)}"
 
     @property
     def expected(self) -> str:
-        """Description of the expected time after td."""
+        """Description of the expected motion after td."""
         if self.at_rest:
-            return (
-                "the same as in the reference: nothing vibrates in the flight up to td"
-            )
+            return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
         if self.mean_energy_bounds is not None:
             parts.append(
-                f"{format_bounds(self.mean_energy_bounds)} of the reference's mean energy after td"
+                f"{format_bounds(self.mean_energy_bounds)} of the mean energy of the reference run after td"
             )
         if self.residual is not None:
             parts.append(f"vibration wrong by {self.residual:.1%}")
@@ -105,7 +104,7 @@ class Decision(NamedTuple):
 
     @property
     def worst_case(self) -> str:
-        """Description of the worst time after td that the record allows."""
+        """Description of the worst motion after td that the record allows."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
@@ -136,7 +135,7 @@ def decide(
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
 ) -> Decision:
-    """Decide on a tr in a situation; ``objections`` make it inadmissible, ``better`` is a better pair.
+    """Decide on a tr in a situation; any ``objections`` make it inadmissible, ``better`` is a better pair.
 
     Without a better pair, ``cure_of_objections`` says what to do about them.
     """
@@ -167,15 +166,19 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is kept, or hardly matters."""
+    """Explain why a pair is good: its vibration is preserved, or hardly matters."""
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f": it is wrong by {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
-    share = quality.worth.share if quality.worth else 0.0
-    reasons = "; ".join(quality.alone.reasons)
-    return (
-        f"{reasons}, but that is at most {share:.2%} of the energy of the next contact"
-    )
+    return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
+
+
+def _explain_raised_grade(quality: Quality) -> str:
+    """Explain why the error of the vibration hardly matters; empty if the vibration is graded by itself."""
+    if quality.worth is None or quality.alone.grade == quality.vibration.grade:
+        return ""
+    share = quality.worth.share
+    return f", but that is at most {share:.2%} of the energy of the next contact"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:

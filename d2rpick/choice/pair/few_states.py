@@ -1,4 +1,4 @@
-"""Warn if a file with few states does not show the level of a fluctuating energy."""
+"""Warn if a file has too few states for the level of a fluctuating energy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# Files that LS-DYNA usually writes more often than a d3plot.
+# Files that LS-DYNA usually writes more often than d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
@@ -39,8 +39,11 @@ def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     ):
         return
     oftener = list_names([name for name in _OFTENER if name != history.energy_format])
-    text = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
+    text = (
+        f"{states} states of the {history.energy_format} up to td = {td:.6g} are too few to show how the "
+        "energy oscillates"
+    )
     yield Caution(
         "few-states",
-        f"{text}, so its level at td is unsure; name what was written more often: {oftener}",
+        f"{text}, so the energy at td is uncertain; name a file with more states: {oftener}",
     )

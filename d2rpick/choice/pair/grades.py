@@ -1,4 +1,4 @@
-"""Define the grades of a pair of times, and the verdict for each; apart from the grading, which needs numpy."""
+"""Define the grades of a pair and their verdicts; separate from the grading, which needs numpy."""
 
 from __future__ import annotations
 

@@ -27,28 +27,28 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History, Samples
 
-# Errors of a deformation within this difference of the smallest are equally good [-]; the earliest safe tr wins then.
+# Deformation errors within this difference of the smallest are equally good [-]; then the earliest safe tr is chosen.
 EQUALLY_GOOD = 0.02
-# Level errors within this difference are of like quality [-]: the level alone gives the mean energy after td to within
-# 10 % at best, and changes by as much while td moves by less than the margin. A timing tolerance allows the same change
-# of an error.
+# Level errors within this difference have similar quality [-]: the level gives the mean energy after td to 10 % at
+# best.
+# It changes by as much while td moves by less than the margin, and a timing tolerance allows the same change.
 LIKE_LEVELS = TOLERATED_GROWTH
 # Largest level error of a crossing by rounding, for levels above this share of the highest energy [-].
 ROUNDING: Final = 1e-3
-# Decimals to which errors are compared. Pairs of equal error, as on all swings of one mode, differ in the last digits
-# by rounding, which must not decide their order.
+# Decimals to which errors are compared.
+# Pairs of equal error, as in all cycles of one mode, differ by rounding, which must not decide their order.
 _DECIMALS: Final = 4
-# Rigid times within this share of the longest are alike; there a small position error is worth more [-].
+# Rigid times within this share of the longest are similar; then a small position error decides [-].
 _LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-]: the default tolerance for tr.
 MOST_GOOD = 0.2
-# Largest residual of a good pair if the record hides a further mode [-]: a good grade is a promise.
+# Largest residual of a good pair if the record may hide a further mode [-], since a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
-# An energy has passed its mean if it is this multiple of the standard deviation beyond it; smaller noise is ignored.
+# An energy has passed its mean if it is beyond it by this share of the standard deviation; less may be noise.
 _BAND: Final = 0.25
-# Limits for the energy of the vibration error as a share of that of the next contact [-]: up to the first a pair is
-# good, up to the second not poor (docs/explanation/validation-vibration.md).
+# Limits for the energy of the vibration error as a share of that of the next contact [-].
+# Below the first a pair is good, below the second fair (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NAMED: Final = 5  # number of parts that a sentence names
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
@@ -64,7 +64,7 @@ def rank_candidates(
 
 
 def rank_judged(judged: Judged) -> Iterator[Candidates]:
-    """Rank the candidates of each td, number them, and recommend the first within the limits of the settings, if any.
+    """Rank and number the candidates of each td, and recommend the first within the limits of the settings.
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
@@ -99,7 +99,7 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
 
 def get_limit_of_like_quality(situation: Situation) -> float:
-    """Return the difference of errors up to which pairs are of like quality [-]: of deformations, or of levels."""
+    """Return the largest difference between errors of similar quality [-]: of deformations, or of levels."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
@@ -120,7 +120,7 @@ def order_by_quality(
     room: Samples,
     alike: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of candidates by group, in each group first those of like quality.
+    """Return the order of candidates by group; in each group those of similar quality come first.
 
     Their error is within ``room`` of the smallest, or below ``alike``; both have shape (groups,), the other arguments
     shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
@@ -185,7 +185,7 @@ def list_exceeded_limits(
 
 
 class Cause(NamedTuple):
-    """Why a grade is not better: the ``reason``, and the ``cure`` that would make it better."""
+    """The ``reason`` why a grade is not better, and the ``cure`` that would improve it."""
 
     reason: str
     cure: str
@@ -193,16 +193,16 @@ class Cause(NamedTuple):
 
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
-    "write the momenta of the parts (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
+    "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
 )
 _UNKNOWN_LOAD: Final = Cause(
-    "momentum or energy changes in the flight, by gravity or by another load",
-    "give the deck of the run as `deck`, which defines gravity and loads, or write the momenta of the parts",
+    "gravity or another load changes momentum or energy in the flight",
+    "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
 )
 
 
 class Grade(NamedTuple):
-    """A ``grade``, one of `GRADES`, and the ``causes`` why it is not better; empty for "good"."""
+    """A ``grade`` of `GRADES`, and the ``causes`` why it is not better; empty for "good"."""
 
     grade: str
     causes: tuple[Cause, ...] = ()
@@ -221,7 +221,7 @@ class Grade(NamedTuple):
 
 
 def grade_residual(residual: float) -> str:
-    """Return the grade of a residual by itself [-].
+    """Return the grade of a residual [-] alone.
 
     Examples
     --------
@@ -234,7 +234,7 @@ def grade_residual(residual: float) -> str:
 
 
 class Quality(NamedTuple):
-    """Two grades of a pair: of the ``motion``, and of the ``vibration`` after td; the worse one counts.
+    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td; the worse one is used.
 
     ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
     relative to the next contact, None if that is unknown.
@@ -313,7 +313,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(
-        f"how the deformations at tr and td lie to each other is unknown{why}",
+        f"it is unknown whether the parts are deformed in the same direction at tr and td{why}",
         f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
     )
 
@@ -321,23 +321,23 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would show the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
-        return "name the parts to be switched with `parts`, if the files have parts"
+        return "name the parts to be switched with `parts`, if the files contain parts"
     other_parts = situation.together.not_chosen.parts
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
-        return f"name all parts that vibrate together with `parts`: {names} as well"
+        return f"name all parts that vibrate together with `parts`, here also {names}"
     return "write the energies more often"
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Return the cause that the vibration after td is wrong, and whether tr or td has to be changed."""
+    """Return the cause that the vibration after td is wrong, and whether to change tr or td."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
-        return Cause(reason, "choose another tr or td, as d2rpick explore lists them")
+        return Cause(reason, "choose another tr or td (d2rpick explore lists them)")
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "choose another td, as d2rpick explore lists them",
+        "choose another td (d2rpick explore lists them)",
     )
 
 
@@ -351,7 +351,7 @@ def _list_causes_of_record(
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
         causes.append(
             Cause(
-                "the record falls below zero, as no internal energy does",
+                "the energy becomes negative, which an internal energy never does",
                 "name the internal energy with `energy` or `parts`",
             )
         )
@@ -360,7 +360,7 @@ def _list_causes_of_record(
         states_text = f"the record has {states:.3g} states per period"
         causes.append(
             Cause(
-                f"{states_text}, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+                f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
                 "write the energies more often",
             )
         )
@@ -368,7 +368,7 @@ def _list_causes_of_record(
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:
-    """Return how well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
+    """Rate how well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, otherwise 0."""
     if best.tr_high is None or best.timing_tolerance is None:
         return 2
     if _is_loose(best):
@@ -377,7 +377,7 @@ def rate_certainty_of_tr(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Return True if the lock-in error may exceed that of a good pair, within the accuracy of tr."""
+    """Return True if the frozen-deformation error may exceed that of a good pair, within the accuracy of tr."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -396,13 +396,13 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "choose another td, as d2rpick explore lists them",
+                "choose another td (d2rpick explore lists them)",
             )
         )
     elif high > _MOST_HIDDEN:
         causes.append(
             Cause(
-                f"the vibration after td may be wrong by up to {high:.0%}, since the record may hide a further mode",
+                f"the vibration after td may be wrong by up to {high:.0%}, because the record may hide a further mode",
                 _describe_cure_for_modes(situation),
             )
         )
@@ -410,7 +410,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(
-                f"tr is known to ±{reach:.1g} only, but the error grows by 0.05 within ±{best.timing_tolerance:.1g}",
+                f"tr is known only to ±{reach:.1g}, but its timing tolerance is ±{best.timing_tolerance:.1g}",
                 "write the energies more often, and with more digits",
             )
         )

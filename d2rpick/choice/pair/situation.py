@@ -55,9 +55,9 @@ if TYPE_CHECKING:
 
 # Largest error of a solver's energy, as a share of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# A fluctuation below this share of the largest vibration energy since the load ended counts as none: 1 % amplitude.
+# A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
-# Printed digits: a constant energy may alternate between two printed values, each off by half a digit.
+# Rounding: a constant energy may alternate between two printed values, each off by half a digit.
 _QUANTA: Final = 2
 
 
@@ -77,7 +77,7 @@ def is_at_rest(
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
         return False
-    # 0 if no energy is written at all, which shows nothing
+    # this is 0 if no energy is written at all
     rounding = round_off(history)
     if rounding > 0 and float(np.abs(inside).max()) <= rounding:
         return True
@@ -132,13 +132,13 @@ class AnswerAtTd:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Share of the vibration energy that no tr saves, K [-]; None on basis ``"energy"`` and at rest."""
+        """Kinetic fraction K at td [-], which no tr preserves; None on basis ``"energy"`` and at rest."""
         return self.situation.kinetic_share
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Situation:
-    """A history as seen from one td [time], with the flight and the vibration around td.
+    """A history for one td [time], with the flight and the vibration around td.
 
     ``evidence`` describes the vibration that was found.
     """
@@ -151,12 +151,12 @@ class Situation:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Model of the vibration that can be relied on at td."""
+        """Reliable model of the vibration at td."""
         return model_at(self.whole, self.evidence)
 
     @cached_property
     def whole(self) -> Vibration:
-        """Model of the vibration that the energy of all chosen parts shows."""
+        """Model of the vibration in the energy of all chosen parts."""
         return find_energy_at(self.history, self.td, self.evidence)
 
     @property
@@ -175,7 +175,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # without a vibration there is no share
+        return share  # without a vibration the fraction is undefined
 
     @property
     def earliest_tr(self) -> float | None:
@@ -193,7 +193,7 @@ class Situation:
 
     @cached_property
     def margin(self) -> float:
-        """Time kept clear before the next contact [time]; 0 for a given td without a given margin or landing."""
+        """Time kept free before the next contact [time]; 0 for a given td without a given margin or landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
@@ -205,12 +205,12 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin that a chosen td keeps: the given one, or the time by which the next contact may come earlier."""
+        """Margin of a chosen td: the given one, or the time by which the next contact may come earlier."""
         return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
     def at_rest(self) -> bool:
-        """True if nothing vibrates in the flight."""
+        """True if there is no vibration in the flight."""
         start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
@@ -235,7 +235,7 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance, for many modes less than removing the vibration."""
+        """Largest error of an acceptable tr [-]: the tolerance; for many modes also the error without any vibration."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
@@ -254,7 +254,7 @@ class Situation:
         )
 
     def sees_as(self, situation: Situation) -> bool:
-        """Return True if both situations, of one record, share the flight and the evidence, and differ in td only."""
+        """Return True if both situations belong to one record, flight and evidence, and differ in td only."""
         return (
             self.evidence.is_that_of(situation.evidence)
             and self.flight == situation.flight
@@ -368,7 +368,7 @@ def make_look(
     *,
     quick: bool = True,
 ) -> Look:
-    """Return a function that examines a record at a td, and remembers its answer for each td.
+    """Return a function that examines a record at a td, and caches its answer for each td.
 
     No flight is assumed to begin before ``since`` [time].  ``quick`` has the same meaning as in the examination of one
     td.
@@ -378,7 +378,7 @@ def make_look(
 
 
 def _limit_start(situation: Situation, since: float) -> Situation:
-    """Return the situation with a flight that does not begin before ``since`` [time]."""
+    """Return the situation with a flight that begins at or after ``since`` [time]."""
     flight = situation.flight
     if flight.start is None or flight.start >= since:
         return situation
@@ -392,7 +392,7 @@ def _find_flight_at(
     evidence: Seen,
     described: Described | None,
 ) -> Flight:
-    """Return the flight around td, from the evidence or as the user gives it; supported parts never fly."""
+    """Return the flight around td, from the evidence or given by the user; supported parts never fly."""
     flight = find_flight(history, td, evidence, described)
     if evidence.held:
         return flight
@@ -404,7 +404,7 @@ def _find_flight_at(
 
 
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Limit a flight to the time in which no support acts on the parts.
+    """Limit a flight to the time in which no support holds the parts.
 
     A flight found by the momenta of the parts is limited already.
     """
@@ -458,7 +458,7 @@ def _find_oscillator(
 def _find_window_of_modes(
     history: History, td: float, settings: Settings, evidence: Seen
 ) -> Described | None:
-    """Return a window that modes describe, if only the energy can show a flight; else None."""
+    """Return a window described by modes if only the energy can show a flight, otherwise None."""
     if evidence.flight or evidence.refusal or not settings.replay:
         return None
     # imported here: most records do not need it

@@ -1,4 +1,4 @@
-"""Warn about a td, estimate the time after it from the energy alone, and list the objections to a tr.
+"""Warn about a td, estimate the motion after it from the energy alone, and list the objections to a tr.
 
 Warnings have stable codes for scripts, and sentences for users.
 """
@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# States per period of the energy below which modes faster than those found may matter.
+# States per period of the energy below which undetected faster modes may matter.
 _FEW_STATES = 4
 # Kinetic fraction beyond which more than half of the vibration is lost at td for every tr [-].
 POOR_KINETIC_SHARE = 0.5
-# Residual beyond which a pair is poor [-]: 0.5 is 25 % of the vibration energy, and the error is visible in the motion
-# after td.
+# Residual above which a pair is poor [-]: 0.5 is 25 % of the vibration energy,
+# and the error is visible in the motion after td.
 POOR_RESIDUAL = 0.5
-# Plastic energy above this share of the vibration gets a warning [-]: energy alone cannot tell it from a preload.
+# Plastic energy above this share of the vibration energy gets a warning [-]: it may also be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Energy at rest as a share of the lowest in flight [-]: many modes are never at rest at once, so it is lower. This
-# share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16. The
-# lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
+# Static energy as a share of the lowest energy in flight [-]: many modes are never at rest at the same time.
+# This share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16.
+# The lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
 _AT_REST = 0.85
-# Largest mean energy after td over that of the reference run [-]. Switching adds no energy; a larger ratio means that a
-# contact lies in the flight. The estimate itself is right to within 20 %.
+# Largest mean energy after td relative to the reference run [-]. Switching adds no energy,
+# so a larger ratio means that a contact lies in the flight. The estimate itself is right to within 20 %.
 MOST_KEPT = 1.2
 # Largest exponent of e, near the largest double.
 _LARGEST_EXPONENT = 700.0
@@ -77,17 +77,24 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
     share = situation.kinetic_share
     if situation.at_rest:
         text = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
-        advice = "" if situation.flight.unknown_load else "any tr there is right, and "
-        yield Caution("at-rest", f"{text}: {advice}the first one saves the most")
+        advice = (
+            ""
+            if situation.flight.unknown_load
+            else "any tr in this interval is right; "
+        )
+        yield Caution(
+            "at-rest", f"{text}: {advice}the earliest keeps the parts rigid for longest"
+        )
         return
     if situation.energy_td <= 0:
         text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution(
-            "no-energy", f"{text}; a level to lock in needs a positive energy"
+            "no-energy",
+            f"{text}; it must be above 0 to be matched at tr; choose another td",
         )
     if share is not None and share > POOR_KINETIC_SHARE:
-        lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
-        yield Caution("poor-td", f"{lost} and no tr can keep it")
+        lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g},"
+        yield Caution("poor-td", f"{lost} and no tr can keep it; choose another td")
     if mode and (
         mode.preload
         or abs(mode.energy_plastic)
@@ -96,7 +103,7 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         text = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
         yield Caution(
             "plastic-or-preload",
-            f"{text}; the energy alone cannot tell one from the other",
+            f"{text}; the energy alone does not show which of them it is",
         )
 
 
@@ -108,19 +115,19 @@ def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
         text = f"the fastest vibration in the energy has {states:.2g} states per period"
         yield Caution(
             "coarse-record",
-            f"{text}, and a still faster one is not seen; let the run write more states",
+            f"{text}; a faster one would not be seen; write the energies more often",
         )
     if vibration.estimated:
         yield Caution(
             "kinetic-share-estimated",
-            f"the kinetic share is what {vibration.estimated}",
+            f"the kinetic fraction is an estimate: it is what {vibration.estimated}",
         )
     for part in vibration.signed.unsigned if vibration.signed else ():
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
 
 def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
-    """Yield the warnings about the flight and the place of td in it."""
+    """Yield the warnings about the flight and the position of td in it."""
     flight = situation.flight
     td = situation.td
     earliest = situation.earliest_tr
@@ -132,22 +139,20 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("flight-sources-disagree", doubt)
     yield from _warn_about_evidence(situation)
     if flight.source == "energy":
-        text = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
+        text = f"the end of the load, {flight.start:.6g}, is known from the energy alone, which is not certain"
         if (
             flight.settled is not None
             and flight.start is not None
             and flight.settled < flight.start
         ):
-            text += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
+            text += f" (the {flight.start - flight.settled:.3g} after {flight.settled:.6g} are not used, for safety)"
         yield Caution(
-            "flight-from-energy", f"{text}; give it as `after` where it is known"
+            "flight-from-energy", f"{text}; if you know it, give it as `after`"
         )
     if earliest is None:
-        text = "nothing in the record shows when the load is over"
+        text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
-        yield Caution(
-            "no-flight", text if is_given else f"{text}; give that time as `after`"
-        )
+        yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
     elif td <= earliest:
         yield Caution(
             "td-in-load",
@@ -172,15 +177,15 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
         or margin.source != "grazing"
     ):
         return
-    grazed = f"the force of the contact at {flight.end:.6g} stays below 1 % of the largest one at first"
+    grazed = f"the force of the contact at {flight.end:.6g} is at first below 1 % of its maximum"
     if margin.grazing == "momentum":
         grazed = f"the contact at {flight.end:.6g} takes less than 10 % of the momentum towards it"
     early = min(margin.time, flight.end - flight.start)
-    moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
+    moved = f"the body only grazes it, so a position error at td makes it come up to {early:.2g} earlier"
     if early < flight.end - flight.start:
         advice = f"keep td before {round_down_as_read(flight.end - early):.6g}"
     else:
-        advice = "no td is safe"
+        advice = "no td in this flight is safe"
     yield Caution("grazing-contact", f"{grazed}: {moved}; {advice}")
 
 
@@ -190,29 +195,27 @@ def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
     if flight.source == "momentum":
-        text = "the momentum changes at a constant rate in the flight, which was taken for gravity"
+        text = "the momentum changes at a constant rate in the flight, which is assumed to be gravity"
         yield Caution(
             "gravity-assumed",
-            f"{text}; the mass, or kinetic and internal energy, would show whether it is",
+            f"{text}; write the mass, or kinetic and internal energy, to check this",
         )
         return
     if flight.source == "contact-force":
-        text = "contacts whose forces are not written, and other loads, do not show in those that are"
+        text = "the flight is known from the contact forces in the files, which do not show other contacts and loads"
         yield Caution(
             "flight-uncertain",
-            f"{text}; momenta of the parts would make the flight sure",
+            f"{text}; write the part momenta to confirm it",
         )
         return
-    text = "nothing but energies shows the flight, and a fixed wall does no work"
+    text = "the flight is known from energies alone, which do not show the force of a fixed wall"
     if flight.unknown_load:
-        text = "nothing but energies shows the flight, in which gravity or another load works"
-    yield Caution(
-        "flight-uncertain", f"{text}; momenta of the parts would make it sure"
-    )
+        text = "the flight is known from energies alone, and gravity or another load acts in it"
+    yield Caution("flight-uncertain", f"{text}; write the part momenta to confirm it")
 
 
 def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
-    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or if that is unknown."""
+    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or it is unknown."""
     bodies = situation.bodies
     if bodies is None:
         return
@@ -229,16 +232,17 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     which = f" of {name_units(worst.body.parts)}" if worst.body else ""
     share = worst.error / float(drift.path[-1])
     last = float(drift.time[-1] - drift.time[0])
-    frozen = (
-        f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
-    )
+    frozen = f"{drift.part.name} is frozen at a place where it is not at td = {situation.td:.6g}"
     bound = "at least " * worst.at_least
-    distance = f"there the body{which} is off by {bound}{worst.error:.3g}, {share:.1%} of its path in the flight"
+    distance = (
+        f"the body{which} is then out of place by {bound}{worst.error:.3g}, {share:.1%} of its path in "
+        "the flight"
+    )
     assumption = (
         "; this holds if the parts become one rigid body" if worst.assumed else ""
     )
     if worst.assumed and situation.settings.bodies is None:
-        assumption += ", which `deck` tells"
+        assumption += ", which the deck of the run shows (`deck`)"
     turning = compute_turning_speed(situation.history, situation.flight, bodies)
     contact = compute_margin(
         situation.history, situation.flight, place=worst.error, turning=turning
@@ -251,12 +255,15 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe parts that are not connected to the others and fly away from them."""
+    """Describe parts that are not connected to the others and separate from them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
     )
-    return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
+    return (
+        f"{away}: nothing connects them, and one rigid body of all would move like none of them; leave "
+        "these parts out"
+    )
 
 
 def _describe_not_predicted(
@@ -265,9 +272,9 @@ def _describe_not_predicted(
     """Describe the first body whose position error is unknown, and the reason."""
     first = unknown[0]
     others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
-    why = "" if first.whole else "; its pieces do not hang together"
+    why = "" if first.whole else ", because its pieces are not connected"
     which = f"that of {name_units(first.parts)}{others_text}"
-    return f"{len(bodies)} rigid bodies: how far {which} is out of place is not predicted{why}"
+    return f"{len(bodies)} rigid bodies: the position error at td is unknown for {which}{why}"
 
 
 def describe_end_of_load(situation: Situation) -> str:
@@ -294,10 +301,10 @@ def _describe_nearest_flight(situation: Situation) -> str:
         return f"; the next flight begins at {flight.start:.6g}"
     margin = _describe_margin(situation.margin)
     if margin:
-        last = f",{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
+        last = f";{margin} its last td is {round_down_as_read(situation.latest_td):.6g}"
     else:
         last = "; td must lie in it"
-    return f"; the nearest flight lasts from {format_window(flight.start, flight.end)}{last}"
+    return f"; the nearest flight is {format_window(flight.start, flight.end)}{last}"
 
 
 class Expectation(NamedTuple):
@@ -338,7 +345,7 @@ class Expectation(NamedTuple):
 
 
 class Means(NamedTuple):
-    """Energies that decide the mean energy after td [energy].
+    """Energies that determine the mean energy after td [energy].
 
     ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``mean_after`` is the mean of the
     reference run after td.
@@ -366,14 +373,10 @@ def compute_means(situation: Situation) -> Means | None:
     mean = compute_mean_in_flight(situation)
     if mean is None or not situation.energy_td > 0 or situation.at_rest:
         return None
-    time, energy = _select_flight(situation)
+    time, energy = select_energies_in_flight(situation)
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
-    # the remaining decay is 0 if its exponential has no floating-point number
-    decay = np.exp(
-        np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
-    )
-    energy_after = resting + (mean - resting) / float(decay.mean())
+    energy_after = resting + (mean - resting) / compute_mean_decay(situation, time)
     if energy_after > round_off(situation.history):
         return Means(mean, lowest, resting, energy_after)
     return None
@@ -388,7 +391,7 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the time after td; None on another basis than "energy", without a flight or energy.
+    """Estimate the motion after td; None on another basis than "energy", without a flight or energy.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
     """
@@ -407,12 +410,18 @@ def estimate_time_after(
 
 def compute_mean_in_flight(situation: Situation) -> float | None:
     """Return the mean energy of the flight, up to td if its end is unknown [energy]; None unless it is positive."""
-    energy = _select_flight(situation)[1]
+    energy = select_energies_in_flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
     return mean if mean > round_off(situation.history) else None
 
 
-def _select_flight(situation: Situation) -> tuple[Samples, Samples]:
+def compute_mean_decay(situation: Situation, time: Samples) -> float:
+    """Return the mean vibration energy at the times relative to that at td [-], from the damping of the flight."""
+    exponents = -situation.flight.damping * (time - situation.td)
+    return float(np.mean(np.exp(np.minimum(exponents, _LARGEST_EXPONENT))))
+
+
+def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Return times and energies of the flight, up to td if its end is unknown; empty if its start is unknown."""
     start = situation.flight.start
     end = situation.flight.end
@@ -437,7 +446,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection to the candidates for which ``holds`` is True, shape (n,).
+    """An objection to the candidates for which ``holds`` (n,) is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.
@@ -491,11 +500,12 @@ def list_objections(
         moves & ~described, partial(_tell_undescribed, situations, situation_of)
     )
     yield Objection(
-        moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation")
+        moves & ~same_sign,
+        partial(_tell_always, "at tr the deformation has the opposite direction"),
     )
     error = np.where(compared, columns["lock_in_error"], columns["level_error"])
     judged = moves & described & same_sign
-    nothing = "the energy is not positive here, so there is nothing to compare"
+    nothing = "the energy is not positive at tr, so no deformation can be compared"
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     limits = np.array([situation.most_error for situation in situations])[situation_of]
     too_much = judged & (error > limits)
@@ -504,7 +514,7 @@ def list_objections(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # beyond its end the flight shows nothing about the time after td
+    # after its end the flight shows nothing about the time after td
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
@@ -554,7 +564,7 @@ def _tell_undescribed(
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
-    """Return the same objection for each candidate."""
+    """Return the same objection for every candidate."""
     return [reason]
 
 
@@ -593,27 +603,25 @@ def _tell_above_the_reference(
 def _describe_in_load(situation: Situation) -> str:
     """Describe that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
-        return (
-            situation.flight.refusal or "unknown: nothing shows when the load is over"
-        )
+        return situation.flight.refusal or "unknown: no end of the load is found"
     return f"before {describe_end_of_load(situation)}"
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """Describe that a switch is worse than a release without any vibration, or than the best one at this td."""
+    """Describe that a switch is worse than a release without vibration, or than the best one at this td."""
     smallest = situation.vibration.least_residual or 0.0
-    better = f"{NOTHING_KEPT:g}, which a release without any vibration has"
+    better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
-        better = f"{smallest:.2g}, which is the least at this td"
-    return f"residual {residual:.2g} above {better}"
+        better = f"{smallest:.2g}, the smallest at this td"
+    return f"residual {residual:.2g}, more than {better}"
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
     """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
-        text = f"the mean energy after td is expected to be {times} times that of the reference"
-        yield f"{text}, more than {MOST_KEPT:g} times"
+        text = f"the mean energy after td is expected to be {times} times that of the reference run"
+        yield f"{text}, at most {MOST_KEPT:g} was expected"
 
 
 def list_objections_to_td(situation: Situation) -> Iterator[str]:
@@ -621,5 +629,5 @@ def list_objections_to_td(situation: Situation) -> Iterator[str]:
     if situation.td > situation.latest_td:
         yield f"td after {describe_end_of_flight(situation)}"
     if situation.settings.strict and not situation.flight.certain:
-        yield "the flight was found from the energy alone, which is not certain"
+        yield "the flight is known from the energy alone, which is not certain"
     yield from situation.vibration.doubts

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     # Test of times: returns True for each that keeps it.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of halvings of the sampling interval at an end of a window: the end is exact to a millionth of it.
+# Number of bisections of the sampling interval at the end of a window: the end is exact to a millionth of it.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
 # Largest error of the polyline [-]: half of the last printed digit.
 _EXACT: Final = 5e-4
-# Number of halvings of an interval in which the error is curved: a square root at zero energy is exact to 1/4000 then,
-# a parabola much sooner.
+# Number of bisections of an interval with a curved error.
+# A square root at zero energy is then exact to 1/4000, and a parabola is far more exact.
 _HALVINGS: Final = 20
 
 
@@ -74,7 +74,7 @@ def find_acceptable_windows(
 
 
 def cut_before_td(situation: Situation, windows: Samples) -> Samples:
-    """Cut the windows one output interval before td: after that nothing is saved."""
+    """Cut the windows one output interval before td, because a later tr saves nothing."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -87,8 +87,8 @@ def find_alike_windows(
 ) -> Samples:
     """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
 
-    The timing tolerance of a candidate is the time by which it may be off before its lock-in error grows by 0.05.  On
-    the energy alone the level error replaces the lock-in error.
+    The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
+    0.05.  On the energy alone the level error replaces that error.
 
     Parameters
     ----------
@@ -141,11 +141,11 @@ def count_coverage(
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    # at one time let windows start before others end, since the ends are included
+    # starts come before ends at the same time, since windows include their ends
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # the gap between two windows that start, or end, at the same time is empty
+    # the gap between windows that start, or end, at the same time is empty
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching
@@ -173,7 +173,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # the largest acceptable energy is passed between samples; stay just below it in floating point
+    # the energy exceeds the largest acceptable value between samples; stay just below it
     highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]
@@ -279,14 +279,14 @@ def interpolate_error(profile: Samples, time: float) -> float:
 
 
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
-    """Return the residuals, or the level errors on the energy alone, in the shape of ``times`` [-]."""
+    """Return the residuals, or the level errors if only the energy is known, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
 def _is_inside(times: Samples, windows: Samples) -> Samples:
-    """Return True for each time that lies in a window."""
+    """Return an array that is True for times in a window."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 

@@ -1,1 +1,1 @@
-"""Choose the parts to switch: what each costs, which may be switched, which sets to compare, and their margins."""
+"""Choose the parts to switch: their costs, which may be switched, which sets to compare, and their margins."""

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# CPU times are right within 5 %, the measured ratios of weights within 50 %: the ratio of both [-].
+# Ratio of the errors of CPU times, 5 %, and of the measured ratios of weights, 50 % [-].
 _DOUBT: Final = 0.1
-# A weight is determined by the legs if they decide more than this share of it, at the given doubt [-].
+# The legs determine a weight if they contribute more than this share to it, with the errors above [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -61,7 +61,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """CPU time of one leg of a run per cycle [us], and what the leg computed.
+    """CPU time of one leg of a run per cycle [us], and the elements and nodes computed in the leg.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
@@ -76,7 +76,7 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """Fitted weights and their origin.
+    """Fitted weights and the number of legs that determine each.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
     """
@@ -105,7 +105,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
     classes = sorted(names & MEASURED.keys())
     if not deformable or not classes:
         raise ConfigurationError(
-            "no leg without rigid parts has elements of a known formulation; give such a run too"
+            "no run without rigid parts has elements of a known formulation; give such a run too"
         )
     start = _make_start_values(deformable, classes)
     matrix, right_side = _build_equations(observations, classes)
@@ -117,7 +117,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
     share = [_compute_element_share(observation, values) for observation in deformable]
     weights = Weights(
         {name: values[name] for name in classes}, float(np.mean(share)), values[_RIGID],
-        f"calibrated by {len(observations)} legs",
+        f"calibrated with {len(observations)} solver runs",
     )  # fmt: skip
     misfit = float(np.sqrt(np.mean((scaled @ solution - 1) ** 2)))
     unknowns = (*classes, _REST, _RIGID)
@@ -172,7 +172,7 @@ def _build_equations(
 
 
 def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Solve non-negative least squares for the unknowns that the rows determine; return all unknowns and which are.
+    """Solve non-negative least squares; return all unknowns, and which of them the rows determine.
 
     Undetermined unknowns stay 1.
     """
@@ -235,7 +235,7 @@ def read_observations_of_runs(
                 else:
                     reason = f"has the content of {same}"
                 cautions.append(
-                    Caution("same-leg-twice", f"{name} {reason}; it counts once")
+                    Caution("same-leg-twice", f"{name} {reason}; it is used once")
                 )
             else:
                 legs_by_content[content] = tuple(legs)
@@ -258,21 +258,29 @@ def read_observations(folder: str) -> tuple[Observation, ...]:
     FormatError
         If no file contains CPU times of the run.
     """
+    if Path(folder).is_file():
+        raise DeckError(
+            f"{folder}: a file, the folder of one run was expected; give the folder that contains it"
+        )
     decks = find_main_decks(folder)
     if len(decks) != 1:
         if decks:
             count = f"{len(decks)} main decks were found"
         else:
             count = "no main deck was found"
-        raise DeckError(f"{folder}: {count}, the folder of one run was expected")
+        raise DeckError(
+            f"{folder}: {count}, exactly one was expected; give the folder of one run"
+        )
     observations = tuple(
         _read_radioss_observations(decks[0])
         if list_run_files(decks[0])
         else _read_ls_dyna_observations(decks[0])
     )
     if not observations:
-        wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
-        raise FormatError(f"{folder}: nothing says what the run took; {wanted}")
+        wanted = "a listing NAME_0001.out of Radioss, d3hsp or glstat was expected; add it to the folder"
+        raise FormatError(
+            f"{folder}: no file contains the CPU time of the run; {wanted}"
+        )
     return observations
 
 

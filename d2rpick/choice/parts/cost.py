@@ -1,4 +1,4 @@
-"""Model the cost of a time step, and the share of it that is saved while some parts are rigid.
+"""Model the cost of a time step, and the share of it that is saved while selected parts are rigid.
 
 A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
 integration points through the thickness. s is the share of the elements in the cost of a step; assembly, contact and
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost per element and cycle [us] of shells with one integration point through the thickness, and of each further point.
-# Fitted to runs of a car of 1516 elements after its first impact, with and without rigid parts, and with its shells in
-# one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).  Beams and springs are not well
-# separated.
+# Cost per element and cycle [us] of shells with one integration point, and of each further point.
+# Fitted to runs of a car of 1516 elements after its first impact, with and without rigid parts.
+# The runs had shells in one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).
+# Costs of beams and springs are not well separated.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
@@ -40,7 +40,7 @@ ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs.
 RIGID_NODE: Final = 0.04
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
-# Sums over all elements stay finite below this; costs in any unit of time are far smaller.
+# Costs must be smaller, so that sums over all elements stay finite; real costs are far smaller in any unit.
 _LARGEST: Final = 1e100
 
 # Keys of the TOML file of weights that ``d2rpick calibrate`` writes.
@@ -111,21 +111,21 @@ def compute_saved_share(
 
 
 class Amount(NamedTuple):
-    """Cost of some elements in the unit of the weights, and their formulations without a weight."""
+    """Cost of a set of elements in the unit of the weights, and its formulations without a weight."""
 
     cost: float
     unknown: tuple[str, ...] = ()
 
 
 class Share(NamedTuple):
-    """Share of a step that is saved while some parts are rigid [-]; None with the reason if it is unknown."""
+    """Share of a step that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
 
     value: float | None
     reason: str | None = None
 
 
 class ByDeck(NamedTuple):
-    """Sources of the values that a deck gives: its files, and the weights, None if the cost share was given."""
+    """Sources of the values from a deck: its files, and the weights, None if the cost share was given."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
@@ -193,7 +193,7 @@ class CostModel:
         return tuple(names)
 
     def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
-        """Return the cost of elements of a part, by class and number."""
+        """Return the cost of elements of a part, given as counts by class."""
         if part in self._rigid:
             return Amount(0.0)
         cost = 0.0
@@ -213,7 +213,7 @@ class CostModel:
         return Amount(cost, tuple(unknown))
 
     def _share(self, amount: Amount, value: float) -> Share:
-        """Return a share if the weights of all elements are known, else None with the reason."""
+        """Return a share if all elements have weights, otherwise None with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
@@ -322,5 +322,5 @@ def _parse_weight(path: str, name: str, value: object) -> float:
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:
         return float(value)
-    except OverflowError:  # an integer of hundreds of digits
+    except OverflowError:  # an integer with hundreds of digits
         return float("inf")

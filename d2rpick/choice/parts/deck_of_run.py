@@ -57,14 +57,14 @@ def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
-    """Return the single rigid body of parts that are merged, whatever ``bodies`` they would become."""
+    """Return the single rigid body of merged parts, regardless of the ``bodies`` they would become."""
     # a single part may consist of pieces
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
 def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
-    """Return a warning if a deck is not that of a run, else None.
+    """Return a warning if a deck does not belong to a run, otherwise None.
 
     It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
     have energy.
@@ -90,7 +90,7 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
     absent = [part for part in run.parts if part.id not in ids_in_deck]
     if not difference and inventory.complete and _has_energy(run, absent):
         difference = f"{name_units(part.id for part in absent)} of the history {choose_verb(absent)} not in the deck"
-    text = f"{difference}: nothing of the deck is used; name that of the run"
+    text = f"{difference}: the deck is not used; give the deck of this run"
     return Caution("deck-of-another-model", text) if difference else None
 
 
@@ -100,7 +100,7 @@ def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
 
 
 def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if some parts have other titles in the deck than in the history."""
+    """Yield a warning if parts have other titles in the deck than in the history."""
     differing = [
         part
         for part in parts
@@ -117,20 +117,20 @@ def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[C
 def warn_about_bodies(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings if ties that are not followed may join the bodies of ``parts``, or one has loose pieces."""
+    """Yield warnings if unread ties may join the bodies of ``parts``, or a body has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
             more_ties = f" and {len(inventory.ties) - 1} more ties"
         else:
             more_ties = ""
-        ties_text = f"{inventory.ties[0]}{more_ties} may join parts that share no nodes, which is not followed"
+        ties_text = f"{inventory.ties[0]}{more_ties} may connect parts that share no nodes, which is not checked"
         yield Caution(
             "ties-not-followed",
-            f"{ties_text}; parts that are tied belong in one rigid body",
+            f"{ties_text}; put tied parts into one rigid body",
         )
-    cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
+    cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece its own part"
     if inventory.solver != "ls-dyna":
-        cure = "each of them needs a rigid body of its own"
+        cure = "give each piece its own rigid body"
     for body in find_rigid_bodies(inventory, parts):
         if not (body.whole or inventory.ties):
             lies = (
@@ -138,14 +138,14 @@ def warn_about_bodies(
             )
             yield Caution(
                 "loose-pieces",
-                f"{lies} in {count_pieces(inventory, body.parts)} pieces that nothing joins; {cure}",
+                f"{lies} in {count_pieces(inventory, body.parts)} pieces that are not connected; {cure}",
             )
 
 
 def warn_about_solver(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings about what ruins a run, unknown supports, and parts whose stresses do not rotate with them."""
+    """Yield warnings about deck features that ruin a run, unknown supports, and stresses that do not rotate."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
@@ -163,9 +163,10 @@ def warn_about_solver(
         if part in inventory.parts and not inventory.parts[part].section.turns
     ]
     if unturned and inventory.solver == "radioss":
-        parts_text = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
+        parts_text = f"{name_units(unturned)}: the stresses of these solids do not rotate with the rigid body"
         yield Caution(
-            "stresses-unturned", f"{parts_text}; expect an error after a large rotation"
+            "stresses-unturned",
+            f"{parts_text}; expect wrong stresses after a large rotation",
         )
 
 
@@ -183,11 +184,11 @@ def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caut
 
 
 def warn_about_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
-    """Yield warnings about what was not followed in a deck and, if its cost is ``used``, about weights not measured."""
+    """Yield warnings about unread cards of a deck and, if its cost is ``used``, about assumed weights."""
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if used and model.assumed:
-        taken = f"the cost of {', '.join(model.assumed)} was not measured; that of a formulation alike was taken"
+        taken = f"the cost of {', '.join(model.assumed)} was not measured; the cost of a similar formulation is used"
         yield Caution("weights-by-analogy", taken)
 
 
@@ -205,7 +206,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 
 
 def _is_different_title(first_title: str, second_title: str) -> bool:
-    """Return True if two titles differ, except in spaces, case, and length if one is cut off.
+    """Return True if two titles differ, ignoring spaces, case, and the length of a truncated one.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
@@ -241,9 +242,9 @@ def add_deck_to_settings(
     history = reference.history
     settings = replace(settings, kept_off=inventory.kept_off, ruined=ruined)
     if not history.parts:
-        why = "no parts are named whose elements are saved; give them with `parts`"
+        why = "name the switched parts with `parts`"
         if settings.cost_share is None:
-            open_ = [Caution("cost-unknown", f"the run time stays open: {why}")]
+            open_ = [Caution("cost-unknown", f"the CPU time is not estimated: {why}")]
         else:
             open_ = []
         return replace(settings, bodies=()), (*doubts_of_parts, *open_)
@@ -264,7 +265,7 @@ def add_deck_to_settings(
     ]
     if share.reason:
         doubts.append(
-            Caution("cost-unknown", f"the run time stays open: {share.reason}")
+            Caution("cost-unknown", f"the CPU time is not estimated: {share.reason}")
         )
     return with_cost, tuple(doubts)
 
@@ -327,7 +328,7 @@ def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _sum_gravity(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Return the possible sizes of the sum of several loads; None if the sum is unknown."""
+    """Return the possible values of the sum of several loads; None if the sum is unknown."""
     if len(loads) < 2:
         values = loads[0].values if loads else ()
         return tuple(sorted({abs(value) for value in values} or {0.0}))

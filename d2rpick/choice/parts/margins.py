@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
 
-# Number of times in a flight at which a body is tried as frozen: motion within it is slow.
+# Number of times in a flight at which a body is tried as frozen: its inner motion is slow.
 _TIMES: Final = 100
 
 

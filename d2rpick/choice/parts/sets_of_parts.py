@@ -1,4 +1,4 @@
-"""Compare sets of parts: what each saves, its position error, and which one to make rigid."""
+"""Compare sets of parts: the saving and the position error of each, and which set to make rigid."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Savings that differ by less are equal: the cost model is right to within a few percent of the run time [-].
+# Savings that differ by less are equal [-]: the cost model is right to within a few percent of the run time.
 _LIKE: Final = 0.01
 # The set "heavy" has at least this share of the mass of all switchable parts [-].
 _HEAVY: Final = 0.5
 _ALL, _STILL = "all that may", "all but what moves"
-_NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
+_NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotates, so the rotation error is unknown"
 
 
 class PartSet(NamedTuple):
@@ -101,7 +101,7 @@ class PartSet(NamedTuple):
 
     @property
     def out_of_place(self) -> bool:
-        """True if the position error exceeds its limit, or a part flies away from the body that it joins."""
+        """True if the position error exceeds its limit, or a part separates from its body."""
         error = self.position_error
         limit = self.position_limit
         return self.apart or (error is not None and limit is not None and error > limit)
@@ -204,9 +204,9 @@ def find_given_parts(run: OpenedRun, names: Sequence[str]) -> tuple[int, ...]:
     if not names:
         return ()
     if has_recommended(names, run.parts):
-        cure = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        cure = "name a set to compare, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(
-            f"{run.name}: the recommended set is what is looked for here; {cure}"
+            f"{run.name}: d2rpick parts itself finds the recommended set; {cure}"
         )
     numbers = replace_words_by_part_ids(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
@@ -250,7 +250,7 @@ def _drop_repeated_sets(sets: Sequence[PartSet]) -> list[PartSet]:
 
 
 def _list_sets(rows: Sequence[PartRow], given_ids: Sequence[int]) -> Iterator[PartSet]:
-    """Yield the sets worth comparing."""
+    """Yield the sets that are useful to compare."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
     rows_by_name = {
@@ -284,7 +284,7 @@ def _select_heavy(movable: Sequence[PartRow]) -> list[PartRow]:
 
 @dataclass(frozen=True)
 class _SetComparison:
-    """The run, settings, costs and parts that all sets are compared with."""
+    """The run, settings, costs and parts with which all sets are compared."""
 
     run: OpenedRun
     settings: Settings
@@ -293,11 +293,11 @@ class _SetComparison:
 
     @cached_property
     def placement(self) -> Placement | None:
-        """Places of the parts according to the deck; None without a deck."""
+        """Positions of the parts according to the deck; None without a deck."""
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set with its costs and errors, for a given (tr, td) or td, or for a td of its own."""
+        """Complete a set with its costs and errors, for a given (tr, td) or td, or for its own best td."""
         reasons = list[str | None]()
         if self.model:
             share = self.model.saved(part_set.parts)
@@ -430,7 +430,7 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
 
 
 def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Mark the recommended set: it saves most; of sets that save equally much it has the fewest parts.
+    """Mark the recommended set: the largest saving, and of equal savings the fewest parts.
 
     A set with too large a position error is considered only if all sets have one.
     """
@@ -462,7 +462,7 @@ def _warn_about_sets(
     if model is None:
         yield Caution(
             "no-deck",
-            "without a deck the cost and most verdicts stay open; name the main deck of the run",
+            "without a deck the CPU time and most verdicts are unknown; give the main deck of the run",
         )
         return
     yield from warn_about_titles(

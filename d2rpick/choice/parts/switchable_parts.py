@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-]: most of the
-# energy is plastic work then, and the vibration a small part of it.
+# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-].
+# Most of the energy is then plastic work, and the vibration a small part of it.
 STOPPED: Final = 0.1
-# The start of a landing, as a share of the duration of the flight before it [-].
+# Duration of the first phase of a landing, as a share of the flight before it [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part drives the landing alone if it takes up at least this share of the energy at first, and has at most this share
-# of the cost, so that it is cheap to keep it deformable [-]: a bumper or a skid, not the body shell.
+# A part takes the landing alone if it absorbs at least this share of the energy at first.
+# It must have at most the second share of the cost, so that it may stay deformable [-], such as a bumper or a skid.
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
@@ -111,7 +111,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # no part ever deforms
+    except FormatError as error:  # raised if no part ever deforms
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -139,12 +139,12 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
             run.surroundings.held([part], moment),
         )
     return RunFacts(
-        facts, spans, longest, None if flights else "no flight is seen in the history"
+        facts, spans, longest, None if flights else "no flight is found in the history"
     )
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together, or of all that deform without momenta, and the flying parts."""
+    """Return the energy of the parts that fly together, or of all deformable parts, and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -153,7 +153,7 @@ def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | No
 def _is_flying(
     part: Part, flight: Flight, members: Sequence[Part] | None
 ) -> bool | None:
-    """Return True if a part flies with the rest; None if no momenta of parts show it."""
+    """Return True if a part flies with the others; None if no part momenta show it."""
     if members is None:
         return None
     together = flight.parts if flight.source == "momentum" and flight.parts else members
@@ -181,7 +181,7 @@ def _measure_in_flight(
 def _measure_landing(
     time: Samples, energy: Samples, span: tuple[float, float]
 ) -> float | None:
-    """Return the energy that a part takes up at the start of the landing [energy]; None if the record ends before."""
+    """Return the energy that a part absorbs at the start of the landing [energy]; None if the record ends before."""
     start, end = span
     energies = energy[find_window(time, end, end + _LANDING * (end - start))]
     if end < float(time[-1]) and energies.size > 1:
@@ -202,7 +202,7 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
 
 
 class PartRow(NamedTuple):
-    """One part with all its data; None for unknown values.
+    """All data of one part; None for unknown values.
 
     ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
     time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
@@ -268,7 +268,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; mass and time step ``by_deck`` are used if no better ones are known."""
+    """Collect the data of a part; mass and time step ``by_deck`` are used if no better values are known."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -328,7 +328,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with its verdict and reasons; ``alone`` is the part that drives the landing alone."""
+    """Return the row of a part with verdict and reasons; ``alone`` is the part that takes the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(
@@ -366,7 +366,7 @@ def _list_reasons_to_keep(
     if row.kind == "spring":
         yield "discrete"
         if data and data.section.damped:
-            yield "with dampers, whose work only grows in its energy"
+            yield "with dampers, whose energy contains the dissipated work"
         return
     if row.kind in ("airbag", "void", "particles"):
         yield {
@@ -383,13 +383,13 @@ def _list_reasons_to_keep(
     if fact and fact.held:
         yield fact.held
     elif fact and fact.has_energy is False:
-        yield "never any internal energy: rigid, or fixed"
+        yield "never has internal energy: rigid, or fixed"
     elif row.flight and row.flight.flies is False:
-        yield "does not fly with the rest"
+        yield "does not fly with the other parts"
     if data and not data.section.turns:
-        yield "stresses of its solids do not turn with a rigid body"
+        yield "stresses of its solids do not rotate with a rigid body"
     if row.id == alone:
-        yield "drives the landing alone, at little cost"
+        yield "determines the landing alone, and costs little"
 
 
 def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
@@ -403,7 +403,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
         return
     pieces = count_pieces(inventory, [row.id], among=inventory.parts.keys())
     if pieces > 1:
-        yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
+        yield f"{pieces} disconnected pieces, which LS-DYNA would make one rigid body"
 
 
 def _list_unknowns(
@@ -411,19 +411,19 @@ def _list_unknowns(
 ) -> Iterator[str]:
     """Yield the data that are missing to judge a part without objections."""
     if inventory is None:
-        yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
+        yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:
         yield "not in the deck"
     elif row.elements is None:
-        yield "its elements are not in what was read of the deck"
+        yield "its elements are not in the files of the deck that were read"
     elif data.material is None:
         yield "its material is not in the deck"
     if row.id not in facts.parts:
         yield facts.reason or "not in the history"
     elif row.flight is None:
-        yield facts.reason or "no flight is seen"
+        yield facts.reason or "no flight is found"
     elif row.flight.flies is None:
-        yield "no momenta of parts show whether it flies with the rest"
+        yield "no part momenta show whether it flies with the other parts"
 
 
 def _list_remarks_on_switch(
@@ -431,12 +431,12 @@ def _list_remarks_on_switch(
 ) -> Iterator[str]:
     """Yield remarks on a part that may be switched."""
     if row.kind == "rigid":
-        yield "rigid in the deck, but it has internal energy in the history"
+        yield "rigid in the deck, but has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
         yield (
-            "still vibrates in the flight, so tr matters"
+            "flies and still vibrates, so tr matters"
             if row.flight.deforms
-            else "has stopped deforming"
+            else "flies and no longer vibrates"
         )
     if data and data.section.formulations.keys() & {
         "solid",
@@ -444,7 +444,7 @@ def _list_remarks_on_switch(
         "pentahedron",
         "thick shell",
     }:
-        yield "solids: solvers may misreport their energy while they are rigid"
+        yield "solids: some solvers report wrong energies for them while they are rigid"
     if fact and fact.has_energy is None:
         yield "its energy is not written"
 
@@ -469,7 +469,7 @@ def compute_step_growth(
 
 
 def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
-    """Find the cheap part that takes up nearly all energy at the start of the landing after the longest flight."""
+    """Find the cheap part that absorbs nearly all energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
         for row in rows
@@ -485,7 +485,7 @@ def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merge_rows(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Merge parts that share nodes or are joined into one rigid body: the first id leads, the others merge with it."""
+    """Merge connected parts into one rigid body: the first id is the lead part, the others are merged with it."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

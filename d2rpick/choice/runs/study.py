@@ -1,4 +1,4 @@
-"""Ask one question for many runs: the tr of each, how well they agree, one tr for all, and which runs stand out."""
+"""Ask one question for many runs: the tr of each, their agreement, one tr for all, and outliers."""
 
 from __future__ import annotations
 
@@ -56,15 +56,15 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
 )
 # Tukey's fences lie at this multiple of the interquartile range beyond the quartiles [-].
 _FENCE: Final = 1.5
-# Largest number of runs that a sentence names.
+# Largest number of runs named in a sentence.
 NAMED: Final = 3
-# Share of the rigid time that may be given up for a number with few digits [-].
+# Share of the rigid time that may be given up for a number with fewer digits [-].
 _ROUNDED: Final = 0.001
-# Codes of warnings of single runs that are not repeated: the row shows them, or the study does not answer them.
+# Codes of warnings of single runs that are not repeated: the row shows them, or they do not concern the study.
 _NOT_REPEATED = ("no-candidate",)
-# A record that ends before this share of the median end time was cut off [-]: variants of a model end together.
+# A record that ends before this share of the median end time was cut off [-], as variants end together.
 _WHOLE: Final = 0.99
-# Number of intervals of a drawn curve, each with its lowest and highest energy: twice as many as can be seen.
+# Number of pieces of a drawn curve, each with its lowest and highest energy: twice as many as are visible.
 _STRETCHES = 200
 
 
@@ -87,7 +87,7 @@ class Question:
 
 
 class Stamp(NamedTuple):
-    """A file as it was when its run was read: size in bytes, modification time in nanoseconds."""
+    """State of a file when its run was read: size in bytes, modification time in nanoseconds."""
 
     name: str
     size: int
@@ -136,7 +136,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs and the window around it that they share [time]; else None and the reason.
+    """One tr for all judged runs with its shared window [time]; otherwise None and the reason.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors of the runs at this tr, in their order: residuals, or
@@ -187,7 +187,7 @@ class StudyOfRuns:
         for row, error in zip(self.runs, self.common.errors, strict=True):
             if error is None or row.residual is None or row.basis == "energy":
                 continue
-            # the grade of its own pair may be better than by its residual: the error is worth little
+            # its own pair may have a better grade than its residual, if the error hardly matters
             at_common_tr = grade_residual(error)
             if GRADES.index(at_common_tr) < GRADES.index(grade_residual(row.residual)):
                 grades.append(at_common_tr)
@@ -296,7 +296,7 @@ def stamp_files(source: str) -> tuple[Stamp, ...]:
         states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
         ]
-    except (D2RPickError, OSError):  # reported by whoever reads the run
+    except (D2RPickError, OSError):  # the reader of the run reports it
         return ()
     return tuple(
         Stamp(path, state.st_size, state.st_mtime_ns) for path, state in states
@@ -324,7 +324,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs and the bounds of the interval within the accuracy of each (low > high: none)."""
+    """Return the tr of all runs and the interval within the accuracy of each (low > high: none)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
@@ -332,7 +332,7 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 
 
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
-    """Return the runs that were cut off: their files end within a state, or their record before that of most runs."""
+    """Return the runs that were cut off: files that end within a state, or records shorter than most."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
     return [
@@ -361,14 +361,15 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             f"{len(cut)} of {format_number_of_runs(len(rows))} were cut: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
-        text = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
+        text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"
         yield Caution(
-            "timing-tolerance", f"{text}: the error of a run grows by more than 0.05"
+            "timing-tolerance",
+            f"{text}: in at least one run the error grows by more than 0.05",
         )
     for code, sentence, kinds in (
         (
             "mixed-units",
-            "the times of the runs have different units, td has only one",
+            "the runs have different units of time, but td has only one",
             [row.time_unit for row in judged],
         ),
         (
@@ -393,7 +394,7 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
 
 
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
-    """Choose one tr for all judged runs: their own if they agree, else the earliest that is alike for all.
+    """Choose one tr for all judged runs: their own if they agree, otherwise the earliest similar for all.
 
     "Alike" keeps the timing tolerance of every run.  If none does, choose the earliest tr acceptable in all runs at
     which the largest loss of a run is hardly larger than necessary.  Unless the runs agree, the tr has few digits; that
@@ -431,7 +432,7 @@ def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | Non
 def _find_least_loss(
     judged: Sequence[StudyRow], shared: Samples
 ) -> tuple[float, float]:
-    """Return the first stretch of the shared windows in which no run loses more than 0.02 above the smallest loss."""
+    """Return the first interval of the shared windows in which no run loses 0.02 more than the smallest loss."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
@@ -477,12 +478,12 @@ def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
             which = f"any of {format_number_of_runs(len(judged))}"
         else:
             which = "the run that was judged"
-        return f"no tr is acceptable in {which}"
+        return f"no tr is admissible in {which}"
     tr = find_fewest_digits(*stretches[np.argmax(counts)])
     unsuited = [row.source for row in judged if not _is_in_windows(row.acceptable, tr)]
     suited = len(judged) - len(unsuited)
     return (
-        f"no tr is acceptable in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
+        f"no tr is admissible in all of {format_number_of_runs(len(judged))}; tr = {tr:.6g} is in {suited}, "
         f"not in {list_names(unsuited, most=NAMED)}"
     )
 
@@ -493,7 +494,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 
 
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
+    """Return the outliers: judged runs without a tr, then those with a tr beyond Tukey's fences.
 
     The farthest from the median come first.
     """

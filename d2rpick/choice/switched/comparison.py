@@ -1,4 +1,4 @@
-"""Compare a finished switched run with its reference run: the energy locked in, the energy at td, and the motion.
+"""Compare a finished switched run with its reference run: locked-in energy, energy at td, and motion.
 
 Between tr and td only the energy is compared: a rigid part reports neither kinetic energy nor momentum.
 """
@@ -25,26 +25,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest deviation of the momentum after td, as a share of it; beyond it the motion differs from the reference [-].
+# Largest deviation of the momentum after td, as a share of the momentum; beyond it the motion is different [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Smaller momenta than this share of the largest of the run count as this share: a resting body cannot deviate much [-].
+# Momenta below this share of the largest one are replaced by it: a resting body cannot deviate much [-].
 _AT_REST = 0.01
-# Some solvers report a wrong energy for rigid solid elements. A difference beyond this share, and beyond the usual
-# change from state to state, gets a note [-].
+# A larger difference between energies while rigid and at td gets a note [-], if it also exceeds the usual change
+# between states. Some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# Largest change of a constant energy, as a share of the energy and of the vibration [-]. A rigid body keeps the energy
-# to its digits; a vibrating one changes by more from state to state. If most of the energy is plastic work, the
-# vibration is a small part of it, hence the second share.
+# Largest change of a constant energy, as a share of the energy and of the vibration [-].
+# The energy of a rigid body is constant to its digits; that of a vibrating one changes more between states.
+# If most of the energy is plastic work, the vibration is a small part of it, hence the second share.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# Tolerance for the energy about tr, as a share of it [-]: a solver switches at the first step from tr on, and output
-# may miss that by a state or two.
+# Tolerance for the energy near tr, as a share of it [-]: a solver switches at the first step after tr,
+# and output may miss that by a state or two.
 _ABOUT = 0.05
 # Number of times between two states at which the switch to rigid is searched.
 _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; the fields are the keys of the JSON output, None if the files lack the quantity.
+    """Measures of a switched run; the fields are the keys of the JSON output, None for unknown quantities.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
     and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
@@ -79,7 +79,7 @@ def compare_with_reference(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a finished switched run with its reference run, by the parts that show how right it is.
+    """Compare a finished switched run with its reference run, by the parts that are in both.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
     ``compare_runs``.
@@ -175,7 +175,7 @@ def compare_runs(
         and _is_reported_wrong(energies_before[-1], energies_to_end[1:])
     ):
         energies_after = energies_after[1:]
-        # the switch comes at the first step from td on: this state was still rigid
+        # the switch comes at the first step from td on, so this state was still rigid
         energies_to_end = energies_to_end[1:]
     frozen = float(energies_after[0])
     energy_td = reference.energy_at(td)
@@ -183,8 +183,10 @@ def compare_runs(
     if energies_before.size and _is_reported_wrong(
         energies_before[-1], energies_to_end
     ):
-        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, at td {frozen:.6g} came back"
-        notes.append(f"{reported}; some solvers report rigid solid elements wrongly")
+        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, after td one of {frozen:.6g}"
+        notes.append(
+            f"{reported}; some solvers report wrong energies of rigid solid elements"
+        )
     still = _find_limit_of_change(reference, switched, tr, td)
     error = _compute_relative_distance(*momenta, td, end)
     rigid = _find_rigid_window(switched, tr, td, still)
@@ -197,8 +199,10 @@ def compare_runs(
         if mean_reference > round_off(reference):
             objections += _check_mean_energy(mean / mean_reference, min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
-        moved = f"the switched run's momentum after td is off by {error:.1%}"
-        objections.append(f"{moved}: its motion differs from the reference")
+        moved = f"the momentum of the switched run after td differs by {error:.1%}"
+        objections.append(
+            f"{moved} from that of the reference run, so it moves differently"
+        )
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -228,16 +232,18 @@ def _check_number_of_states(
         last = float(short.time[-1])
         if last <= td:
             raise RangeError(
-                f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
+                f"{name}: ends at {last:g}, not after td {td:g}; give the later restart segments too"
             )
         states_text = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{name}: {states_text}; too few to compare the runs")
+        raise RangeError(
+            f"{name}: {states_text}; at least 3 are needed to compare the runs"
+        )
 
 
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the largest change of a constant energy [energy]: small relative to the vibration, or digits."""
+    """Return the largest change of a constant energy [energy]: a share of the vibration, or digits."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -277,7 +283,7 @@ def _check_rigid_window(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Yield an objection if the energy is not constant from about tr to about td, as far as the states show.
+    """Yield an objection if the energy is not constant from tr to td, as far as the states show.
 
     A constant energy before tr or after td matters only if that of the reference run is not constant there.
     """
@@ -286,7 +292,7 @@ def _check_rigid_window(
         return
     room = 2 * switched.step
     if rigid[1] - rigid[0] <= room < td - tr:
-        yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
+        yield f"the energy of the switched run is not constant from tr {tr:g} to td {td:g}: was it switched?"
         return
 
     def lasts_longer(start: float, end: float) -> bool:
@@ -300,38 +306,38 @@ def _check_rigid_window(
         or lasts_longer(rigid[0], tr)
         or lasts_longer(td, rigid[1])
     ):
-        rigid_text = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        rigid_text = f"the energy of the switched run is constant from {rigid[0]:.6g} to {rigid[1]:.6g}"
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Yield objections if the energy at td is not that of the reference run about tr, or not that at td."""
+    """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # nothing vibrates: the error of nothing means nothing
+        return  # without a vibration the relative error has no meaning
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
         yield (
-            f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
+            f"the energy after td, {frozen:.6g}, is not the energy of the reference run at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
     if measures.level_error(frozen, energy_td) > tolerance:
-        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {energy_td:.6g}"
+        yield f"the frozen energy, {frozen:.6g}, differs from the energy of the reference run at td, {energy_td:.6g}"
 
 
 def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
     """Yield an objection if the mean energy after td differs from that of the reference run."""
     if not min_mean <= share <= 2 - min_mean:
         mean_text = (
-            f"the mean energy after td is {share:.2g} times that of the reference"
+            f"the mean energy after td is {share:.2g} times that of the reference run"
         )
         yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: its energy is constant between them, that of the reference run is not.
+    """Find tr and td of a switched run: the window in which only its energy is constant.
 
     Returns
     -------
@@ -348,7 +354,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     rounding = round_off(reference)
-    # in a fall the energy of rigid parts and of those at rest is round-off, which never stays the same
+    # round-off energies of rigid or resting parts change during a fall
     unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
     still = find_stretches(np.append(False, unchanged), FEWEST)
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
@@ -379,9 +385,12 @@ def _explain_why_no_times(
     if np.array_equal(switched.time, reference.time) and np.array_equal(
         switched.energy, reference.energy
     ):
-        return "the energies of the switched run and of the reference run are the same"
+        return "both runs have the same energies, so it may be the reference run again"
     if not spans:
-        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
+        return (
+            f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid; "
+            "was it switched?"
+        )
     first, last = spans[0]
     start, end = switched.time[first], switched.time[last]
     return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"

@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Evidence that shows the start of a flight to within some states; the energy alone is less exact.
+# Evidence that locates the start of a flight within a few states; the energy alone is less exact.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# A model moves although its parts do not, if the parts have less than this share of its momentum [-].
+# The model moves but its parts do not, if they have less than this share of its momentum [-].
 _HARDLY: Final = 0.1
-# Number of states without kinetic energy, or with constant internal energy, that a deformable part never has in a row.
+# Fewest consecutive states without kinetic energy, or with constant internal energy, that show a rigid part.
 FEWEST: Final = 12
 # Relative change below which an internal energy is constant: solvers write single precision [-].
 SAME: Final = 1e-6
-# A flight that begins within so many output intervals after tr began before tr, as far as the output shows.
+# A flight that begins within this number of output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
 
@@ -70,7 +70,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def took_off(self) -> float | None:
-        """End of a contact in which the parts were rigid from tr on [time]; None if the flight had begun before tr."""
+        """End of a contact in which the parts were rigid from tr on [time]; None if the flight began before tr."""
         if (
             self.flight is None
             or self.flight.start is None
@@ -83,12 +83,12 @@ class DoneWindow(NamedTuple):
 
     @property
     def rigid_in_contact(self) -> bool:
-        """True if a contact began or ended while the parts were rigid: nothing after it is as planned."""
+        """True if a contact began or ended while the parts were rigid, so that the plan after it is invalid."""
         return self.landed_rigid or self.took_off is not None
 
     @property
     def moved(self) -> float | None:
-        """Delay of the landing relative to the plan [time]; None if one of both is unknown."""
+        """Delay of the landing relative to the plan [time]; None if one of them is unknown."""
         if self.landing is None or self.planned is None:
             return None
         return self.landing - self.planned
@@ -97,13 +97,19 @@ class DoneWindow(NamedTuple):
     def description(self) -> str:
         """Sentence for the user on what became of the window."""
         if self.flight is None:
-            return "no flight is seen there"
+            return "no flight is found there"
         if self.took_off is not None:
-            return f"took off at {self.took_off:.6g}, {self.took_off - self.tr:.3g} after tr: rigid in the contact"
+            return (
+                f"took off at {self.took_off:.6g}, {self.took_off - self.tr:.3g} after tr: the parts were "
+                "rigid in the contact"
+            )
         if self.landing is None:
-            return "no landing was seen after it"
+            return "no landing is found after it"
         if self.landed_rigid:
-            return f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: rigid in the contact"
+            return (
+                f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: the parts were "
+                "rigid in the contact"
+            )
         landed = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
         if self.moved is None:
             return landed
@@ -115,7 +121,7 @@ class DoneWindow(NamedTuple):
 def prepare_switched_history(
     reference: Reference, done: Sequence[Times]
 ) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
-    """Prepare the history of a run whose parts were rigid for some time, so that it can serve as a reference run.
+    """Prepare the history of a run with rigid windows, so that it can serve as a reference run.
 
     Parameters
     ----------
@@ -163,7 +169,7 @@ def prepare_switched_history(
 
 
 def select_model_momenta(history: History) -> History:
-    """Return a history without the momenta of parts, some of which were replaced by rigid bodies.
+    """Return a history without part momenta, as rigid bodies have replaced parts.
 
     Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
     """
@@ -176,7 +182,7 @@ def select_model_momenta(history: History) -> History:
 
 
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Return the windows in which parts are rigid, as far as quantities of parts show them [time].
+    """Return the windows in which parts are rigid, as far as part quantities show them [time].
 
     If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
@@ -240,7 +246,7 @@ def find_done_windows(
 def _find_flight_around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
-    """Return the flight that shares most time with a window; None if no flight overlaps it."""
+    """Return the flight with the longest overlap with a window; None if no flight overlaps it."""
 
     def shared(flight: Flight) -> float:
         start = float(history.time[0]) if flight.start is None else flight.start
@@ -271,21 +277,23 @@ def _warn_about_deforming(
             if not is_rigid
         ]
         if names and history.parts:
-            deforming = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {list_names(names)}"
+            deforming = (
+                f"from {tr:.6g} to {td:.6g} these parts deform: {list_names(names)}"
+            )
             yield Caution(
-                "partly-rigid", f"{deforming}; the window counts as done for the others"
+                "partly-rigid", f"{deforming}; for the others the window is done"
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
-        return  # a free fall looks the same
+        return  # parts without internal energy may also be in free fall
     where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
     raise RangeError(
-        f"{where}, a window that is said to be done; give the run that was switched so"
+        f"{where}, a window that `done` names; give the run that was switched in it"
     )
 
 
 class _AbsentWindow(NamedTuple):
-    """A window in which some of the parts were ``rigid`` [time]; ``whole`` if no other part deforms."""
+    """A window in which the ``rigid`` parts have no energies [time]; ``whole`` if no other part deforms."""
 
     start: float
     end: float
@@ -297,14 +305,14 @@ class _AbsentWindow(NamedTuple):
         """Warning about the rigid parts of the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
-            window_text = f"the parts were rigid {when}, give or take an output interval: taken as done"
+            window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
             return Caution("rigid-times", window_text)
-        window_text = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
+        window_text = f"{when} these parts were rigid: {self.rigid}; the others deform, so the window is not done"
         return Caution("partly-rigid", window_text)
 
 
 def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
-    """Return the windows in which parts have no kinetic energy while the model moves: a rigid body has it."""
+    """Return the windows in which parts have no kinetic energy although the model moves."""
     parts = _select_deformable(reference)
     balance = reference.history.balance
     if parts:
@@ -336,7 +344,7 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or all, ``among`` others that have internal energy at the times of the history."""
+    """Return the chosen parts, or all parts ``among`` others, that have internal energy."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
@@ -390,7 +398,7 @@ class SameParts(NamedTuple):
 def choose_same_parts(
     without: Reference, switched: Reference, pair: Times
 ) -> SameParts:
-    """Choose the parts by which a finished switched run is compared with its reference run.
+    """Choose the parts for the comparison of a finished switched run with its reference run.
 
     Parameters
     ----------
@@ -447,12 +455,12 @@ def _choose_compared_parts(
     if not comparable:
         energies_text = f"the energies of {_list_part_names(misreported)}"
         objections.append(
-            f"{energies_text} are reported wrongly after td: nothing is left to compare but the motion"
+            f"{energies_text} are wrong after td, so only the motion can be compared"
         )
     elif misreported:
         left_out = f"left out of the comparison: {_list_part_names(misreported)}"
         notes.append(
-            f"{left_out}, whose energy is reported wrongly after td; some solvers do so with solids that were rigid"
+            f"{left_out}, whose energy is wrong after td, as some solvers report it for solids that were rigid"
         )
     selection = Selection(
         parts=tuple(str(part.id) for part in comparable or chosen),
@@ -467,7 +475,7 @@ def _choose_compared_parts(
 def _find_misreported(
     without: Reference, switched: OpenedRun, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Return the parts whose energy after td differs from that at tr by more than their largest energy without D2R."""
+    """Return the parts with an energy after td that differs from that at tr by more than is possible."""
     time = switched.part_time
     energies = switched.part_energies(parts)
     # the first state from td on may still be rigid

@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
-# Places in the record at which a continuing vibration is searched, as shares of its length [-].
+# Positions in the record at which a vibration without contacts is searched, as shares of its length [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-_NO_FLIGHT: Final = "nothing in the record shows a flight, in which td could be chosen"
+# Shorter rigid windows, as a share of the record, save less than a restart costs [-].
+MIN_RIGID: Final = 0.05
+_NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
 
 def find_longest_flight(
@@ -49,13 +51,13 @@ def find_longest_flight(
         held = history.surroundings.held(history.parts, float(history.time[-1]))
         if held:
             reason = held
-            cure = "only what nothing holds can be switched"
+            cure = "name parts that nothing holds"
         elif settings.after is not None:
             reason = _NO_FLIGHT
             cure = "give `td`"
         else:
             reason = _NO_FLIGHT
-            cure = "give the end of the load as `after` where it is known"
+            cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(
@@ -118,7 +120,7 @@ def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
 def _add_given_start(
     history: History, settings: Settings, flights: tuple[Flight, ...]
 ) -> tuple[Flight, ...]:
-    """Add the flight that starts at the end of the load given by the user, unless a flight contains that time."""
+    """Add the flight that starts at the user-given end of the load, unless a flight contains that time."""
     load_end = settings.after
     last = float(history.time[-1])
     windows = [flight.within(history.time) for flight in flights]
@@ -143,7 +145,7 @@ def _add_given_start(
 def _insert_flight(
     history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
-    """Return flights ascending in time, with the given flight replacing those that it overlaps."""
+    """Return flights in ascending order, with the given flight replacing those that it overlaps."""
     first, last = given_flight.within(history.time)
     windows = ((flight, *flight.within(history.time)) for flight in flights)
     kept_flights = [
@@ -169,7 +171,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 def _find_flights_without_landing(
     history: History, settings: Settings
 ) -> tuple[Flight, ...]:
-    """Find the flights without a given landing: by evidence, else by an oscillator or modes, else by quiet times."""
+    """Find the flights by evidence, otherwise by an oscillator or modes, otherwise by quiet times."""
     witnessed = find_all_seen(history)
     if witnessed:
         return tuple(
@@ -183,7 +185,7 @@ def _find_flights_without_landing(
             )
             for source, window in witnessed
         )
-    # imported here: evidence better than the energy does not need it
+    # imported here: better evidence than the energy does not need it
     from d2rpick.choice.pair.situation import (
         make_look,
     )
@@ -195,17 +197,17 @@ def _find_flights_without_landing(
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # this flight ends with the vibration, even if its start is given
+                # this flight ends with the vibration, also if its start is given
                 return (flight,)
         look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
-    # the last quiet time before td shows most of the flight
+    # the last quiet time before td covers most of the flight
     for td in sorted(list_moments(history.time), reverse=True):
         if flights and flights[-1].start is not None and td > flights[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
-        # a flight that lasts into the next one misses the load between them, so its end is unknown
+        # a flight that reaches the next one misses the load between them, so its end is unknown
         lasts = (
             flights
             and flight.within(history.time)[1] > flights[-1].within(history.time)[0]

@@ -1,4 +1,4 @@
-"""Plan the rigid windows of a run: the times for every flight, and the windows that this reference run supports.
+"""Plan the rigid windows of a run: the times for each flight, and the windows supported by this reference run.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
@@ -26,7 +26,7 @@ from d2rpick.choice.switched.switched_run import (
     find_done_windows,
     prepare_switched_history,
 )
-from d2rpick.choice.td.flights import compute_last_td, find_flights
+from d2rpick.choice.td.flights import MIN_RIGID, compute_last_td, find_flights
 from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
@@ -41,11 +41,9 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# Rigid windows shorter than this share of the record save less than a restart costs [-].
-MIN_RIGID: Final = 0.05
-# A window is left out for a later one that is more than this factor longer [-]. With w rigid in the first and W in the
-# other, one after the other saves w in the next run and w + W in the run after that. The other alone saves W in both
-# runs, which is more if W > 2 w.
+# A window is left out for a later one that is longer by more than this factor [-].
+# With the windows w and W one after the other, the next run saves w, and the run after it w + W.
+# The other window alone saves W in both runs, which is more if W > 2 w.
 _LONGER: Final = 2.0
 
 
@@ -96,12 +94,12 @@ class PlannedFlight(NamedTuple):
 
     @property
     def decision(self) -> Decision | None:
-        """Verdict on the pair as in ``suggest``; None without a pair, or if it is done."""
+        """Verdict on the pair as in ``suggest``; None without a pair, or if the window is done."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the pair as in ``suggest``; None without a window, or if it is done."""
+        """Grade of the pair as in ``suggest``; None without a window, or if the window is done."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
@@ -133,7 +131,7 @@ class RunPlan:
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
-        """Flights whose windows this reference run supports."""
+        """Flights whose windows are supported by this reference run."""
         return tuple(row for row in self.flights if row.status == "supported")
 
     @property
@@ -143,7 +141,7 @@ class RunPlan:
 
     @property
     def all_windows(self) -> tuple[Times, ...]:
-        """(tr, td) of all windows that are not done, including those that wait for a switched run [time]."""
+        """(tr, td) of all windows that are not done, including those that need a switched run first [time]."""
         return tuple(
             row.window
             for row in self.flights
@@ -152,7 +150,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """(tr, td) of the next run, in order: the done and the supported windows; empty without new ones [time].
+        """(tr, td) of the next run: the done and the supported windows; empty without new ones [time].
 
         The next run starts again from the beginning, so it needs both.
         """
@@ -238,7 +236,7 @@ def _list_rows(
     shortest: float,
     done_rows: Sequence[DoneWindow],
 ) -> Iterator[PlannedFlight]:
-    """Yield every flight with its window, as if each were the first."""
+    """Yield every flight with its window, planned as if it were the first."""
     last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # end of the previous flight
@@ -252,10 +250,10 @@ def _list_rows(
             for done in done_in_flight:
                 yield row._replace(status="done", reason=done.description, done=done)
         elif last is not None and start < last:
-            yield row._replace(reason="before the last window that is done")
+            yield row._replace(reason="before the last window that the run has done")
         elif settings.after is not None and end <= settings.after:
             yield row._replace(
-                reason=f"the load ends after it, at {settings.after:.6g}"
+                reason=f"before the end of the load at {settings.after:.6g} (`after`)"
             )
         elif end - margin.time - start < shortest:
             yield row._replace(
@@ -285,7 +283,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Return the row with the suggestion for its flight, which does not reach back beyond the previous landing.
+    """Return the row with the suggestion for its flight, which starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
@@ -296,7 +294,7 @@ def _suggest_window(
     flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
         flight_settings = replace(flight_settings, landing=None)
-    # the energy alone may show no end of the flight to a td in it: keep the margin before the listed end
+    # the energy alone may not show the end of the flight to td, so keep the margin before the listed end
     window = row.start, compute_last_td(row.end, row.margin.time)
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
@@ -322,9 +320,9 @@ def _suggest_window(
 
 
 def _explain_grade(decision: Decision, pair: Pair) -> str:
-    """Explain why a pair is not planned, and how to plan it nevertheless."""
+    """Explain why a pair is not planned, and how to plan it anyway."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
-    advice = f"with `min_quality` {decision.grade} it is planned all the same"
+    advice = f"with `min_quality` {decision.grade} it is planned nevertheless"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
 
 
@@ -334,11 +332,14 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
         margin_text = f", with the margin {margin.time:.3g} before the contact"
     else:
         margin_text = ""
-    return f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}, at least {shortest:.3g} was asked for"
+    return (
+        f"too short: rigid for {max(rigid, 0.0):.3g}{margin_text}; the shortest window allowed is "
+        f"{shortest:.3g} (`min_rigid`)"
+    )
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
-    """Leave out each window that locks in energy before a much longer one, even if that has to wait for a run."""
+    """Leave out each window that locks in energy before a much longer one, which then may need a further run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         longest_after = max(
@@ -354,10 +355,15 @@ def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
-        longer = f"flight {longest_after.number} behind it for {longest_after.rigid_time:.3g}"
+        longer = (
+            f"flight {longest_after.number} after it for {longest_after.rigid_time:.3g}"
+        )
         window_text = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
-        why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
-        cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
+        why = (
+            "this window freezes vibration energy and shifts the later landings, so that flight would "
+            "need a further run"
+        )
+        cure = f"with `min_rigid` below {rigid:.6g} this window is planned too"
         yield row._replace(status="left-out", reason=f"{window_text}: {why}; {cure}")
 
 
@@ -369,7 +375,7 @@ def _mark_status(
     why = ""
     if in_contact:
         window = f"the window {in_contact.tr:.6g} to {in_contact.td:.6g}"
-        why = f"the run was rigid in a contact in {window}; plan the windows from there again"
+        why = f"the run was rigid in a contact in {window}; plan the windows from there on again"
     for row in rows:
         if row.status == "supported" and why:
             yield row._replace(status="re-plan", reason=why)
@@ -377,8 +383,8 @@ def _mark_status(
         yield row
         if row.status == "supported" and row.locks_in and row.window:
             tr, td = row.window
-            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which moves the landings after it"
-            why = f"{moved}; plan this one from a run that was switched in that window"
+            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which shifts the later landings"
+            why = f"{moved}; plan this window from a run that is switched in that one"
 
 
 def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
@@ -399,7 +405,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
         and longest.rigid_time > first.rigid_time
     ):
         text = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
-        cure = "with a minimal rigid time between the two it would be supported instead"
+        cure = "with `min_rigid` between the two the longer one is planned instead"
         yield Caution("longer-window-later", f"{text} {first.rigid_time:.3g}: {cure}")
 
 
@@ -424,4 +430,4 @@ def _warn_about_windows(
             yield caution._replace(message=which + caution.message)
     yield from _warn_about_blocked(rows)
     if not rows:
-        yield Caution("no-flight", "nothing in the record shows a flight")
+        yield Caution("no-flight", "no flight is found in the record")

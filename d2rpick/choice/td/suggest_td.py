@@ -19,7 +19,7 @@ from d2rpick.choice.pair.quality import (
 )
 from d2rpick.choice.pair.situation import Situation, make_look
 from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
-from d2rpick.choice.td.flights import find_longest_flight
+from d2rpick.choice.td.flights import MIN_RIGID, find_longest_flight
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
@@ -37,24 +37,22 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# Number of peaks that are tried of each kind: the highest, since a high peak of several modes has little kinetic
-# energy, and the last, since a late td saves most.
+# Number of energy peaks that are tried of each kind: the highest ones have little kinetic energy for several modes,
+# and the last ones save most.
 _MOST_PEAKS: Final = 12
-# For many modes the smallest residual is searched among windows of at least this share of the longest one [-].
+# For many modes the smallest residual is searched among windows of at least these shares of the longest one [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 # Good windows of at least this share of the longest good one save as much; the smallest residual decides then [-].
 _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in an even grid: a curve of so many points looks smooth on paper and on a screen.
+# Number of td in an even grid: a curve of that many points looks smooth on paper and on a screen.
 STEPS: Final = 200
-# Decimals of an error that are shown to the user.
+# Decimals of an error shown to the user.
 _READ: Final = 3
-# A shorter window, as a share of the record, saves less than a restart costs, as in a plan [-].
-_SHORTEST: Final = 0.05
-# A longer pair is mentioned if it is longer than the recommended one by this share of the window [-].
+# A longer pair is mentioned if it exceeds the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
-# The contact may come earlier by this multiple of what the energy shows: a constant energy may hide the vibration of
-# many modes. In 20 computed falls the factor was up to 1.9.
+# Factor on the spread of the contact time shown by the energy: a constant energy may hide many vibrating modes.
+# In 20 computed falls the factor was up to 1.9.
 _HIDDEN: Final = 2.0
 
 
@@ -100,7 +98,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Return the index of the first state by which the energy has been near each level, else the number of states.
+    """Return the index of the first state with an energy at or beyond each level, or the number of states.
 
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
@@ -124,7 +122,7 @@ class Chosen(NamedTuple):
     longest: Pair | None
 
     def given_up(self, pair: Pair | None) -> Pair | None:
-        """Return the longest pair if it is rigid for much longer than the recommended ``pair``, else None."""
+        """Return the longest pair if it is rigid much longer than the recommended ``pair``, otherwise None."""
         limit = _MUCH * (self.inside[1] - self.inside[0])
         longest = self.longest
         if longest and pair and longest.rigid_time - pair.rigid_time > limit:
@@ -139,7 +137,7 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, or in the longest flight if it is None, for a tr not before ``since``.
+    """Choose td in ``window``, or in the longest flight for None, with a tr at or after ``since``.
 
     Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
     certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
@@ -192,7 +190,7 @@ def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
     """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # no pair is rigid before the first time
+    grid = np.linspace(*window, steps + 1)[1:]  # there is no pair before the first time
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         intervals = np.searchsorted(grid, peaks)
@@ -232,7 +230,7 @@ def round_error(error: float | None) -> float:
 def _find_unbeaten(
     td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
 ) -> float:
-    """Return ``td``, or a td of ``times`` whose pair is no worse in error and rigid time and better in one.
+    """Return ``td``, or a td of ``times`` with a pair that is better in error or rigid time and worse in neither.
 
     Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
     flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
@@ -315,7 +313,7 @@ def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Cho
 def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Return the situation with the best-known flight in ``window``, and the part of it that keeps the margin [time].
+    """Return the situation with the most certain flight in ``window``, and its part that keeps the margin [time].
 
     Raises
     ------
@@ -328,7 +326,7 @@ def find_best_known(
 
 
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in the window that keeps the margin also after rounding to the printed digits.
+    """Return the last td in the window that keeps the margin even after rounding to printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
     """
@@ -343,7 +341,7 @@ def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in a window in which nothing vibrates.
+    """Return the last td in a window without vibration.
 
     It lies before the last state, and before the contact by the time that the contact may move.
     """
@@ -358,7 +356,7 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
 
 
 def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
-    """Return the first situation with the best-known flight, at the start, middle or end of the window."""
+    """Return the first situation with the most certain flight, at the start, middle or end of the window."""
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
@@ -369,14 +367,14 @@ def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
 
 
 def _rate_certainty(situation: Situation) -> tuple[bool, int]:
-    """Return a sort key for how certainly td lies in a flight: the smallest is the most certain."""
+    """Return a sort key for the certainty that td lies in a flight: the smallest is the most certain."""
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
 def _choose_by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td with the longest rigid window of like residual, and the one of all acceptable pairs."""
+    """Return the td with the longest rigid window of similar residual, and that with the longest of all."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -393,11 +391,11 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr, of those that are long enough to be planned, if there are any."""
+    """Return the pairs with the most certain tr among those that are long enough to be planned, if any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
-    shortest = _SHORTEST * float(record[-1] - record[0])
+    shortest = MIN_RIGID * float(record[-1] - record[0])
     long = [pair for pair in pairs if pair[1].rigid_time >= shortest] or pairs
     certainties = [_rate_tr_at(situation) for situation, _ in long]
     return [
@@ -479,7 +477,7 @@ def _list_times_by_modes(
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
-    # The smallest of many estimates is too optimistic: add half of the half width.
+    # The smallest of many estimates is too optimistic, so half of the half-width is added.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
     middle = squares[1:-1]
     is_lowest = (middle <= squares[:-2]) & (middle < squares[2:])
@@ -494,7 +492,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest lock-in error of a tr between two times [-], and that tr [time]; infinite for none."""
+    """Return the smallest frozen-deformation error of a tr between two times [-], and that tr [time]; else infinity."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
@@ -506,7 +504,7 @@ def _find_least_error(
 def _choose_by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td by the level alone: the closer to the largest vibration energy, 2 <E>, the better."""
+    """Return the td by the level alone: the best is closest to the largest vibration energy, 2 <E>."""
     mean = compute_mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
@@ -554,7 +552,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, of equal ones the last; None if there is none."""
+    """Return the choice with the longest rigid time, the last of equal ones; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

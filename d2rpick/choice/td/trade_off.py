@@ -1,4 +1,4 @@
-"""Show what each td offers: the best tr over a grid of td and at the energy peaks, as error against rigid time."""
+"""Show what each td offers: the best tr over a grid of td and energy peaks, as error against rigid time."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Another td is worth naming if its error is at most this share of that of the start, and printed digits show it [-].
+# Another td is named if its error is at most this share of the error at the given td, and digits show it [-].
 _MUCH_LESS: Final = 0.5
-# A pair that gives up more than this share of the rigid time answers another question [-].
+# A pair that gives up more than this share of the rigid time is not comparable [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td on the grid of a page: some pixels of a screen apart, and finer than a slider is moved.
+# Number of td on the grid of a page: a few pixels apart, and finer than the steps of a slider.
 _STEPS_OF_PAGE: Final = 120
-# Smallest number of td for a flight in a plan of many: a curve of fewer points shows little.
+# Fewest td for a flight in a plan of many: a curve of fewer points shows little.
 _FEWEST_STEPS: Final = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
-    """The answer of ``suggest`` for one td, of which most is computed only when it is looked up.
+    """The answer of ``suggest`` for one td, most of which is computed on access.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
     offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
@@ -69,7 +69,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The recommended pair of this td, by which different td are compared; None if no tr is recommended."""
+        """The recommended pair of this td, by which td are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -123,7 +123,7 @@ class Offer(AnswerAtTd):
 
     @cached_property
     def decision_with_cure(self) -> Decision | None:
-        """The verdict with the better pair that ``suggest`` names, for which the peaks of the flight are searched."""
+        """The verdict with the better pair named by ``suggest``, which needs a search of the peaks."""
         decision = self.decision
         if decision is None or decision.grade == GOOD:
             return decision
@@ -153,7 +153,9 @@ def make_offers(
             for candidates in candidates_of_each
         ]
         judged_up_to_best = judged.at(np.concatenate(orders))
-        ends = accumulate(rows.size for rows in orders)  # noise makes many candidates
+        ends = accumulate(
+            rows.size for rows in orders
+        )  # noisy records have many candidates
         for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
             best = replace(
                 candidates,
@@ -228,7 +230,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # the full search gives the reason why no oscillator is seen
+    # the full search gives the reason why there is no oscillator
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
@@ -241,7 +243,7 @@ def explore_run(
     # the first td of the flight has too few states before it to show a vibration
     warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        # the energy alone shows a different flight to each td: show that of ``suggest``
+        # the energy alone shows a different flight for each td, so the flight of ``suggest`` is shown
         situation = warned = fully(td)
     start = requested or max(
         filter(_is_comparable, offers),
@@ -267,7 +269,7 @@ def _is_comparable(offer: Offer) -> bool:
 
 
 def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
-    """Mark the unbeaten offers; errors of deformations are not compared with errors of energies."""
+    """Mark the Pareto-optimal offers; errors of deformations are not compared with errors of energies."""
     unbeaten = set()
     for is_residual in (True, False):
         group = [
@@ -286,7 +288,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
         }
         for offer in sorted(group, key=lambda offer: printed[offer.td]):
             rigid, error = printed[offer.td]
-            # equal pairs do not beat each other
+            # equal pairs are both Pareto-optimal
             if error < smallest_error or (error, rigid) == (
                 smallest_error,
                 longest,
@@ -297,7 +299,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest unbeaten offer with half the error, else the recommended one if it has less, else None."""
+    """Return the nearest Pareto-optimal offer with half the error, or the recommended one if better, or None."""
     error = np.inf if start.error is None else start.error
     least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
     comparable = [
@@ -337,10 +339,10 @@ def _warn_about_window(
         kept_clear = window[1] - inside[1]
         yield Caution(
             "margin-kept",
-            f"td up to {inside[1]:.6g}: {kept_clear:.3g} are kept clear up to {window[1]:.6g}",
+            f"td is at most {inside[1]:.6g}: a margin of {kept_clear:.3g} is kept before {window[1]:.6g}",
         )
     if not any(map(_is_comparable, offers)):
-        nothing = "no td in the window has an acceptable tr that saves anything"
+        nothing = "no td in the range has an admissible tr"
         yield Caution("no-candidate", f"{nothing}{_explain_by_limits(suggestion)}")
 
 

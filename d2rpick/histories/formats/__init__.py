@@ -1,4 +1,4 @@
-"""The file formats of histories: each is one line of `READERS` and one module, and some modules share others.
+"""List the file formats of histories: each has one line in `READERS` and one module.
 
 A reader is imported only when a file may have its format. Help texts list the formats without importing their
 readers, which keeps start-up short.
@@ -13,12 +13,12 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Formats whose data fill a family of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
+# Formats with families of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
 FAMILIES: Final = ("d3thdt", "d3plot")
 
 
 class Listed(NamedTuple):
-    """A format as it is known before its reader, the ``module``, is imported.
+    """Description of a format that is known before its reader, the ``module``, is imported.
 
     The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
     names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
@@ -32,9 +32,9 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# In the order in which the formats are tried, and preferred as source of a quantity: binary files come before text
-# files, since they hold more digits; csv accepts any text, so it is the last of these; files that a run seldom writes
-# come last of all.
+# In the order in which formats are tried, and preferred as the source of a quantity.
+# Binary files come before text files, because they have more digits.
+# csv accepts any text, so it comes after them; rare files come last.
 READERS: Final[Mapping[str, Listed]] = {
     "binout": Listed(
         "binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"

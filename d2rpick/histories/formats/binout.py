@@ -1,4 +1,4 @@
-"""LS-DYNA binout: the branches glstat (whole model) and matsum (parts) of one leg of a run.
+"""Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one leg of a run.
 
 A branch has a directory ``metadata`` (title, version, part ids, part titles) and one directory per state,
 ``d000001`` and so on, of variables such as ``internal_energy``: one value in glstat, one per part in matsum.
@@ -36,7 +36,7 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg: a solver continues a binout and spreads its branches there."""
+    """Open the files of each folder as one leg: a solver continues a binout there and distributes its branches."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  start-up
@@ -45,7 +45,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
 
 
 class Binout(Database):
-    """All binout files of one leg (in the order of their family), read as one `Database`.
+    """All binout files of one leg, in the order of their family, read as one `Database`.
 
     Raises FormatError if a file is not a binout, or if none of them has glstat, matsum or contact forces.
     """
@@ -92,11 +92,11 @@ class Binout(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts, both sides as one, and of the rigid walls."""
+        """Forces of the contacts, with both sides combined, and of the rigid walls."""
         return read_binout_forces(self._files)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return for each file where a later read can begin: before the last but one state of both branches."""
+        """Return where a later read of each file can begin: before the last but one state of both branches."""
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:

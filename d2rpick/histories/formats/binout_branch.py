@@ -1,4 +1,4 @@
-"""A branch of LS-DYNA's binout: its states in all files of a family, grouped by file and layout.
+"""Read one branch of LS-DYNA's binout: its states in all files of a family, grouped by file and layout.
 
 A column is gathered with a few array operations, however many states there are. Anything inconsistent - a variable or
 a part that one state lacks, a count that changes - is refused with the state named, never shifted.
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Values gathered at a time; keeps the index arrays small compared with the result.
+# Values gathered at a time, so that the index arrays stay small compared with the result.
 _CHUNK: Final = 1 << 17
 
 
@@ -41,14 +41,14 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Yield groups of so few states that ``width`` values of each fit into a chunk."""
+        """Yield groups with so few states that ``width`` values of each fit into a chunk."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
             yield Group(self.file, self.layout, self.rows[part], self.starts[part])
 
     def values(self, variable: Variable, indices: Indices) -> NDArray[Any]:
-        """Return the values of a list at ``indices``, shape (states, indices); floating-point values as doubles."""
+        """Return the values of a list at ``indices``, shape (states, indices); reals as doubles."""
         positions = (
             self.starts[:, None] + variable.offset + variable.dtype.itemsize * indices
         )
@@ -69,7 +69,7 @@ def _read_start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Return True if the file ends in a state of this branch whose layout differs from the state before."""
+    """Return True if the last state of this branch in a file has another layout than the state before."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 
@@ -77,7 +77,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield what shows, in the states of one file, that records are lost or out of place."""
+    """Yield signs, in the states of one file, that records are lost or misplaced."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
@@ -86,7 +86,7 @@ def _find_damages(
         yield f"{where} has {doubled[0]} twice in one state"
     variable_sets = {frozenset(layout.variables) for layout in layouts}
     if (steps < 1).any() and len(variable_sets) > 1:
-        yield f"{where} begins a new leg whose states have other variables"
+        yield f"{where} begins a new restart segment whose states have other variables"
 
 
 def _group_states(
@@ -169,7 +169,7 @@ class Branch(Database):
         return any(self.name.split("/")[0] in file.names for file in self._files)
 
     def _remarks(self) -> tuple[str, ...]:
-        """Return notes on states that were left out or are missing, and on variables that not all states have."""
+        """Return notes on missing or omitted states, and on variables that some states lack."""
         notes = [
             f"{name}: the last state of {self.name} is not whole and was left out"
             for name in self._unfinished
@@ -223,7 +223,7 @@ class Branch(Database):
 
     @property
     def time_width(self) -> int:
-        """Bytes per time, the fewest of all states; times that are not floating point are refused when read."""
+        """Bytes per time, the fewest of all states; integer times are refused when read."""
         widths = [
             variables["time"].dtype.itemsize
             for variables in self._variables
@@ -239,7 +239,7 @@ class Branch(Database):
             ids = _read_integers(file, start, layout, "legend_ids")
             legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
-                continue  # the titles cannot be separated: their length is not constant
+                continue  # the titles cannot be separated, because their length varies
             raw = file.raw(start, legend)
             width = legend.count // ids.size
             for i, id_ in enumerate(ids.tolist()):
@@ -332,14 +332,14 @@ class Branch(Database):
         return {self._variables[0].get(name, group.layout.variables[name]).count}
 
     def _list_lengths(self, group: Group) -> set[int]:
-        """Return the possible numbers of parts in a group: that of its own list of ids, or of those in the metadata."""
+        """Return the possible numbers of parts in a group: from its own list of ids, or from the metadata."""
         ids_of_states = group.layout.variables.get("ids")
         if ids_of_states:
             return {ids_of_states.count}
         return {ids.size for _, _, ids in self._id_lists}
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        """Return the error for a value of a state that cannot be trusted."""
+        """Return the error for a value of an unreliable state."""
         return FormatError(
             f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
         )
@@ -380,7 +380,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state applies; a file of an MPI rank may contain its list after the first states.
+        # The last list before a state applies; a file of an MPI rank may have its list after the first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {

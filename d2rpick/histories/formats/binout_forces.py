@@ -1,4 +1,4 @@
-"""LS-DYNA binout: the force branches rcforc (contacts) and rwforc (rigid walls)."""
+"""Read the force branches of LS-DYNA's binout: rcforc (contacts) and rwforc (rigid walls)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Branches of forces, and what exerts the forces.
+# Branches with forces, and what exerts the forces.
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force for each contact: its sides have the same force in opposite directions, or one side has none."""
+    """Yield one force for each contact: its sides have opposite forces, or one side has none."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

@@ -1,4 +1,4 @@
-"""The blocks of solver text files: their layout, how many blocks have the same one, and the numbers in them."""
+"""Describe the blocks of solver text files: their layout, their number, and the numbers in them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-UNSURE: Final = -1  # offset of a field that is cut, or occurs twice in the block
+UNSURE: Final = -1  # offset of a field that is truncated, or occurs twice in the block
 
-_OVERLONG: Final = 512  # bytes of a line that no solver writes
+_OVERLONG: Final = 512  # length of a line that no solver writes [bytes]
 
-CHUNK: Final = 1 << 20  # bytes compared together, which stay in the cache
+CHUNK: Final = 1 << 20  # bytes compared at once, which fit into the cache
 _FOLD: Final = 16  # adjacent blocks compared as one row, which halves the time
-_LONGEST: Final = 1 << 22  # bytes; a longer block is walked record by record
+_LONGEST: Final = 1 << 22  # bytes; a longer block is read record by record
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
@@ -36,7 +36,7 @@ _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
 
 class BlockLayout(NamedTuple):
-    """The layout of a block: which field is where.
+    """The layout of a block: the position of each field.
 
     ``fields`` maps the name of a number to its offset in the block, or to UNSURE. ``literal``, shape (size of the
     block,), is 255 for the bytes that all blocks of this layout share, line ends among them, and 0 for the others, so
@@ -51,7 +51,7 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """The form of the blocks of a file format, as the reader of blocks needs it.
+    """Description of the blocks of a file format for the reader of blocks.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
     these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
@@ -84,7 +84,7 @@ class Grammar(NamedTuple):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
         longest_line = max(map(len, block.split(b"\n")))
-        if longest_line >= _OVERLONG:  # further states are hidden in a damaged line
+        if longest_line >= _OVERLONG:  # a damaged line hides further states
             fields = {
                 name: offset if name == self.time else UNSURE
                 for name, offset in fields.items()
@@ -93,7 +93,7 @@ class Grammar(NamedTuple):
 
 
 def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
-    """Read the head of an LS-DYNA text file.
+    """Read the header of an LS-DYNA text file.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
 
 
 def make_head(title: str, database: str) -> str:
-    """Return the two head lines of a made-up file. They name no release of a solver, since no solver wrote the file."""
+    """Return the two header lines of a generated file. They name no release, since no solver wrote the file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
@@ -127,7 +127,7 @@ def count_like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
-    """Count the blocks of ``run`` whose literal bytes, from ``offset`` on, are those of its example.
+    """Count the blocks of ``run`` whose fixed bytes, from ``offset`` on, equal those of its example.
 
     Parameters
     ----------
@@ -190,18 +190,18 @@ def _view_rows(data: Content, first: int, stride: int, count: int, size: int) ->
 
 
 def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
-    """Return the bits in which any of the rows differs from the example, shape (size,)."""
+    """Return the bits in which any row differs from the example, shape (size,)."""
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
-    # A bit is the same in all rows and the example if it is so in the AND and in the OR of the rows.
+    # A bit is the same in all rows and the example if AND and OR of the rows agree with it.
     bits_of_all = _reduce_rows(np.bitwise_and, rows, size)
     bits_of_any = _reduce_rows(np.bitwise_or, rows, size)
     return np.asarray((bits_of_all ^ example) | (bits_of_any ^ example))
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Combine all blocks of some rows, each of one or more blocks of ``size`` bytes, into one block."""
+    """Merge the blocks of several rows, each of one or more blocks of ``size`` bytes, into one block."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -209,7 +209,7 @@ def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
 def count_repetitions(
     data: Content, begin: int, fixed: Bytes, numbers: Sequence[tuple[int, int]]
 ) -> tuple[int, list[int]]:
-    """Count the whole repetitions that follow the block at ``begin`` without a gap.
+    """Count the complete repetitions that directly follow the block at ``begin``.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def count_repetitions(
 def _decode_state_numbers(
     blocks: Bytes, fields: Sequence[tuple[int, int]]
 ) -> NDArray[np.int64]:
-    """Return the decimal numbers of each block, shape (blocks, fields); -1 if a byte of a number is not a digit."""
+    """Return the decimal numbers of each block, shape (blocks, fields); -1 for a number with other characters."""
     numbers = np.empty((len(blocks), len(fields)), dtype=np.int64)
     for column, (offset, width) in enumerate(fields):
         digits = blocks[:, offset : offset + width].astype(np.int64) - ord("0")
@@ -274,7 +274,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return factors and divisors of mantissas without point, by exponent and signs: one is 1, or NaN if inexact."""
+    """Return factors and divisors of integer mantissas, by exponent and signs: one is 1, or NaN if inexact."""
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
         np.minimum(abs(exponent), _EXACT + 1)
@@ -335,7 +335,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     mark = width - 4
     negative = column[point - 2] == ord("-")
     shrinks = column[mark + 1] == ord("-")
-    # uint8 wraps around below "0", so that one comparison is enough
+    # uint8 wraps around below "0", so one comparison is enough
     digits = column[
         [point - 1, *range(point + 1, mark), mark + 2, mark + 3]
     ] - np.uint8(ord("0"))
@@ -346,7 +346,9 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
+    values: Samples = weights @ digits[:-2].astype(
+        np.float64
+    )  # mantissas are exact up to here
     tens, units = digits[-2:]
     scale = (
         tens * np.uint8(10)

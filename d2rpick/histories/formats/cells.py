@@ -1,4 +1,4 @@
-"""The cells of a line of text: how a line is cut into cells, which cells are numbers, and which mark missing values."""
+"""Split lines of text into cells, and recognise numbers and missing values in them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
-# What spreadsheets write for a value that they cannot compute, in English and German.  These begin with the comment
-# sign "#", but a line that begins with one of them is a row.
+# Values that spreadsheets write if a computation fails, in English and German.
+# They begin with the comment sign "#", but a line that begins with one of them is a row.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -30,24 +30,24 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-# What is written for a number that is too wide for its field.
+# Replacement for a number that is too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
-# A number by its decimal sign.  The quantifiers are possessive (no backtracking), so that the time grows linearly with
-# the length of a cell.
+# Patterns of a number, by the decimal sign.
+# The quantifiers are possessive (no backtracking), so that the time is linear in the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
-# A number with thousands separators, to be filled in with this separator and the decimal sign.
+# Pattern of a number with thousands separators; the separator and the decimal sign are inserted.
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
-# Thousands separators that are tried after "." or "," (whichever is not the decimal sign).
+# Thousands separators that are tried after "." or "," (the one that is not the decimal sign).
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# A date, clock time or percentage: not a number, yet no sign that the line was cut with the wrong separator.
+# A date, clock time or percentage: not a number, but no indication of a wrong separator.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-_RULE: Final = "-=+|:_ \t"  # characters of a line drawn between rows or around a table
+_RULE: Final = "-=+|:_ \t"  # characters of a rule between rows or around a table
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
@@ -79,7 +79,7 @@ def split_cells(line: str, separator: str | None) -> list[str]:
 
 
 def is_skipped(line: str) -> bool:
-    """Return True if a line is blank, a comment or a rule drawn with signs.
+    """Return True if a line is blank, a comment or a rule made of signs.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def is_word(cell: str) -> bool:
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
-    """Return the thousands separator of some cells, or an empty string if no cell proves that there is one.
+    """Return the thousands separator of cells, or an empty string if no cell proves that there is one.
 
     A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
 

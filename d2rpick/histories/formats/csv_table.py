@@ -1,4 +1,4 @@
-"""Tables: which column a name or number means, and the numbers in the rows."""
+"""Read tables: find the column for a name or number, and the numbers in the rows."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ _ROW_NUMBERS: Final = frozenset(
 
 
 def label_columns(layout: Layout, time: int) -> dict[str, int]:
-    """Return the columns apart from the time by their names; a name that is not unique gets the column number."""
+    """Return the columns other than the time by name; a repeated name gets the column number."""
     names = number_duplicates([*map(layout.channel, range(layout.trusted))], "column")
     times = {time, *find_own_times(layout)}
     return {name: column for column, name in enumerate(names) if column not in times}
 
 
 def find_own_times(layout: Layout) -> tuple[int, ...]:
-    """Return the time columns of curves side by side, each with its own times (x, y, x, y); () for another table."""
+    """Return the time columns of curves side by side, each with its own times (x, y, x, y); () for other tables."""
     times = tuple(
         column for column in range(0, layout.trusted, 2) if is_time(layout.name(column))
     )
@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column, and notes on what was assumed; of curves side by side the time of the first energy.
+    """Return the time column, and notes on assumptions; for curves side by side the time of the first energy.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column apart from the times, or else the only one named like an internal energy."""
+    """Return the only numeric column besides the times, or the only one named like an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -204,12 +204,12 @@ def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if the first bytes of a file are text; whether it is a table shows when it is read."""
+    """Return True if the first bytes of a file are text; whether it is a table is known after reading it."""
     return head.startswith(UTF16) or b"\0" not in head
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves; the selection gives the time column and the values needed in a last line."""
+    """Open text files as tables or curves; the selection gives the time column and the columns of a last line."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -217,7 +217,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | C
 
 
 class Table(Database):
-    """A table as a `Database` without parts; raises FormatError if the text is none, or lacks a selected column."""
+    """A table as a `Database` without parts; raises FormatError if the text is not a table or lacks a column."""
 
     format = "csv"
     named_by_people = True
@@ -261,7 +261,7 @@ class Table(Database):
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Notes on what was assumed and left out; complete only once the needed columns were read."""
+        """Notes on assumptions and omissions; complete only after the required columns were read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
 
@@ -318,7 +318,7 @@ class Table(Database):
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if the table has one row for each part at each time."""
-        # imported here since hardly any table needs it
+        # imported here: hardly any table needs it
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
         for column in self._needed[1:]:
@@ -362,7 +362,7 @@ class Table(Database):
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
-        """Return the columns that must be whole in a last line without end: the requested ones, or the default ones."""
+        """Return the columns that must be complete in a last line without end: the requested or default ones."""
         try:
             names = [self.find(wanted) for wanted in selection.energy] or [
                 self.energy_channel
@@ -378,8 +378,8 @@ class Table(Database):
         if column in self._failed:
             raise self._failed[column]
         if column not in self._read and self._together:
-            # Read the needed columns first, with the columns that show a flight; a request for another column is
-            # mostly followed by requests for the rest, so read all of them then.
+            # The required columns are read first, with the columns that show a flight.
+            # A request for another column is mostly followed by requests for the rest, so all are read then.
             quantities = [
                 position
                 for name, position in self._columns.items()
@@ -390,7 +390,7 @@ class Table(Database):
                 wanted = {*range(self._layout.columns)} - self._read.keys()
             try:
                 self._keep([self._time, *(wanted - {self._time})])
-            except FormatError:  # perhaps of a column that is not needed
+            except FormatError:  # possibly in a column that is not needed
                 self._together = False
                 self._read_one_by_one(
                     [other for other in quantities if other != column]
@@ -400,7 +400,7 @@ class Table(Database):
         return self._read[column]
 
     def _read_one_by_one(self, columns: Sequence[int]) -> None:
-        """Read these columns one by one; leave out, with a note, one that lacks a number in some row."""
+        """Read these columns one by one; leave out, with a note, those that lack a number in some row."""
         for column in columns:
             try:
                 self._keep([self._time, column])
@@ -421,14 +421,16 @@ class Table(Database):
         table = read_columns(self._text, self._begin, self._layout, columns)
         self._notes += [note for note in table.notes if note not in self._notes]
         for column, values in zip(columns, table.columns, strict=True):
-            values.flags.writeable = False  # callers can share it without copies
+            values.flags.writeable = (
+                False  # read-only, so that callers can share the array without copies
+            )
             self._read[column] = values
 
 
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if a line without end has all values, and its last one is unused or has a constant printed length."""
+    """Return True if a line without end has all values, and its last value is unused or of constant length."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:

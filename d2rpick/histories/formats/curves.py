@@ -1,4 +1,4 @@
-"""Texts of curves one after the other, each with its own times, as pre- and postprocessors export them.
+"""Read texts with one curve after the other, each with its own times, as pre- and postprocessors export them.
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
 star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
-_LONGEST_LABEL: Final = 1000  # characters; keeps the search in a longer line short
+_LONGEST_LABEL: Final = 1000  # characters; limits the search in a longer line
 # Type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
 # x label, y label and name of the curve; the title may be blank
 _FEWEST_LABELS: Final = 3
-_MOST_DIGITS: Final = 12  # of a number of pairs; a longer one is damaged
+_MOST_DIGITS: Final = 12  # digits of a number of pairs; a longer number is damaged
 
 
 class _TextCurve:
@@ -67,7 +67,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """The content of a text while it is read: the curves, the label of their x axis, and the curve that is open."""
+    """State while a text is read: the curves, the label of their x axis, and the unfinished curve."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -164,7 +164,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only one named like an internal energy; FormatError lists all curves otherwise."""
+        """The only curve, or the only one named like an internal energy; otherwise FormatError lists all curves."""
         if len(self.channels) == 1:
             fitting = [0]
         else:
@@ -218,7 +218,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # None becomes NaN
+        # parse_cell returns None for other text, which becomes NaN
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
@@ -231,7 +231,7 @@ class Curves(Database):
         return numbers
 
     def _menu(self) -> str:
-        """Return numbers and names of the curves that can be chosen."""
+        """Return numbers and names of the curves to choose from."""
         return list_names(
             [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
         )

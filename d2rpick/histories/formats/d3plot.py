@@ -1,4 +1,4 @@
-"""LS-DYNA d3plot and d3thdt: energies, velocities and masses of the model and its parts, at the start of each state.
+"""Read LS-DYNA's d3plot and d3thdt: energies, velocities and masses of the model and its parts in each state.
 
 A run writes a family of files. The first file, d3plot, contains the head, the geometry and perhaps states; d3plot01,
 d3plot02 and so on contain whole states only. A state is its time, the values of the model and of the parts, and then
@@ -46,7 +46,7 @@ _MODEL: Final = (
     "z_velocity",
 )
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
-# Values of the parts, each for all parts together, by the number of values of a part before it; the velocity has 3.
+# Values of the parts, each for all parts, by the number of values of a part before it; the velocity has 3.
 _OF_PARTS: Final = {
     "internal_energy": 0,
     "kinetic_energy": 1,
@@ -135,7 +135,7 @@ class D3plot(Database):
                 f"{self.source}: no {name}, there are {list_names(self.channels)}; ask for one of these"
             )
         index = self.channels.index(name)
-        # the forces of rigid walls come after the values of the parts
+        # the forces of rigid walls follow the values of the parts
         of_parts = self._head.part_values * len(self.parts) if index >= GLOBALS else 0
         return self._column(1 + index + of_parts)
 
@@ -187,7 +187,7 @@ class D3plot(Database):
 
 
 def _read_states(files: Sequence[Source], head: Head) -> _States:
-    """Read the first words of all states of a family; in its first file the states begin after the head."""
+    """Read the first words of all states of a family; in its first file the states begin after the header."""
     real = head.form.real
     values = 1 + head.globals
     contents = [make_content(file.data) for file in files]
@@ -196,7 +196,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         max(0, len(content) - begin) // head.state
         for content, begin in zip(contents, begins, strict=True)
     ]
-    ends = np.cumsum(counts).tolist()  # states up to the end of each file
+    ends = np.cumsum(counts).tolist()  # number of states up to the end of each file
     heads = np.empty((ends[-1], values * real.itemsize), np.uint8)
     first_words_after = [
         content.fill_rows(heads[end - count : end], begin, head.state, real.itemsize)
@@ -216,7 +216,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        return _States(rows)  # the usual case, without a look at each file
+        return _States(rows)  # usually, without checking each file
     states_of_files = []
     for file, begin, piece, word in zip(
         files, begins, np.split(rows, ends[:-1]), first_words_after, strict=True
@@ -242,7 +242,7 @@ def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
 def _check_states(
     file: Source, head: Head, begin: int, rows: Rows, word_after: bytes
 ) -> _States:
-    """Return the states of one file up to its end mark; ``word_after`` is the word after the last whole state."""
+    """Return the states of one file up to its end mark; ``word_after`` is the word after the last complete state."""
     content = make_content(file.data)
     name = file.name
     ends = np.flatnonzero(rows[:, 0] == END)
@@ -254,7 +254,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # states begin in the next file
+        ended = True  # the states begin in the next file
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
@@ -282,12 +282,12 @@ def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
 
 
 def _is_blank(content: Content, begin: int, size: int) -> bool:
-    """Return True if there are only zeros, with which a solver pads a file; the nodes of a state are never all 0."""
+    """Return True if there are only zeros, with which a solver pads a file; node coordinates are never all 0."""
     return not content[begin : begin + min(size, _TAIL)].strip(b"\0")
 
 
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
-    """Raise FormatError if the end mark of a file is within a state: then states are longer or shorter."""
+    """Raise FormatError if the end mark of a file is inside a state, whose length is then wrong."""
     first = max(begin, len(content) - _TAIL)
     tail = content[first : len(content)]
     mark = np.array(END, head.form.real).tobytes()

@@ -1,4 +1,4 @@
-"""The sections between the control words and the states of a d3plot: nodes, elements, ids of the parts, titles.
+"""Skip the sections between control words and states of a d3plot: nodes, elements, part ids, titles.
 
 Only sections that describe the states are read; the others are skipped by the lengths that the control words give.
 """
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 _WITH_MATERIAL_TYPES: Final = (5, 7)
 _WITH_ROADS: Final = (6, 7, 9)
 WITH_RIGID_BODIES: Final = (8, 9)
-# Words of each element of a kind in the section after the numbers of nodes and elements.
+# Words per element of each kind in the section after the numbers of nodes and elements.
 _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
 _NUMBERING: Final = 10  # words of the section of numbers before the ids
-_PART_NUMBERING: Final = 16  # the same if the section contains ids of parts
-_TITLE: Final = 72  # bytes of a title in both word widths
+_PART_NUMBERING: Final = 16  # words of the section of numbers if it has part ids
+_TITLE: Final = 72  # bytes of a title for both word widths
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
@@ -37,7 +37,7 @@ _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles, which are skipped one after the other.
+    """The sections between the control words and the titles, which are skipped in order.
 
     ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
     the order of their definition; empty if the file has none. The other attributes count the values in a state.
@@ -101,8 +101,8 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        self.at += version == 4  # the number of chambers
-        # a type and a name of each value
+        self.at += version == 4  # this version has a word for the number of chambers
+        # a type and a name for each value
         self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle
@@ -114,7 +114,7 @@ class Geometry:
         self.at += count_dimensions(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
-        # where the section of numbers begins shows where the additional nodes are
+        # the start of the section of numbers shows where the additional nodes are
         follows = not more_nodes or self._begins_numbering(
             self.at + more_nodes + shells
         )
@@ -236,6 +236,6 @@ class Titles:
         return True
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read this number of integers without moving on."""
+        """Read this number of integers without advancing."""
         integers = self._words.bytes(self.at, count * self._words.form.width)
         return tuple(np.frombuffer(integers, self._words.form.integer).tolist())

@@ -1,4 +1,4 @@
-"""The head of an LS-DYNA d3plot or d3thdt: the form of its numbers, the length of its states, its parts."""
+"""Read the header of an LS-DYNA d3plot or d3thdt: number format, length of the states, and parts."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 GLOBALS: Final = 6
 
 _FEMZIP: Final = 76_893_465  # replaces the number of parts in files packed by femzip
-# At most this value of ``maxint``: a state lists deleted elements, otherwise deleted nodes.
+# Up to this value of ``maxint`` a state lists deleted elements, otherwise deleted nodes.
 _BY_ELEMENT: Final = -10_000
-# Since this release a state has the position of a rigid wall next to its force.
+# From this release on a state has the position of a rigid wall next to its force.
 _WITH_WALL_PLACES: Final = 971.0
 
 # Thermal values of a node by flag: temperatures of one layer or three, and heat flux.
@@ -59,7 +59,7 @@ class Head(NamedTuple):
 
 
 def read_d3plot_head(content: Content, source: str) -> Head:
-    """Read the head of the first file of a family.
+    """Read the header of the first file of a family.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ..
 
 
 def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, str]:
-    """Return the number of quantities of a part (7, fewer in older files), or 0 and the reason why there are none."""
+    """Return the number of quantities of a part (7, fewer in older files), or 0 with the reason."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
         return (
@@ -145,7 +145,7 @@ def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, s
 
 
 def _count_walls(values: int, parts: int, of_part: int, words: Words) -> int:
-    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if they cannot be told apart.
+    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if it is ambiguous.
 
     Releases with a name (R9 and later) are newer than 971, although the number in their files is 960.
     """

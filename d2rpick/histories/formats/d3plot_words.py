@@ -1,4 +1,4 @@
-"""The words of LS-DYNA's d3plot and d3thdt, 4 or 8 bytes long in either byte order, and the control words.
+"""Read the words of LS-DYNA's d3plot and d3thdt, of 4 or 8 bytes in either byte order, and the control words.
 
 The control words at the start of the first file keep the names of their source: "LS-DYNA Database Binary Output
 Files" of LSTC.
@@ -36,12 +36,12 @@ _PLACES: Final = {
 _SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
 _RELEASE: Final = 13  # word with the name of the release; its number follows
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # is added to the file type if ids have 8 bytes
+LONG_IDS: Final = 1000  # added to the file type if ids have 8 bytes
 _DIMENSIONS: Final = range(2, 10)
 
 
 class Form(NamedTuple):
-    """The form of numbers: bytes of a word, and their order as a character of `struct`."""
+    """The number format: bytes of a word, and their order as a character of `struct`."""
 
     width: int
     order: str
@@ -58,7 +58,7 @@ class Form(NamedTuple):
 
 
 def detect_form(head: bytes) -> Form | None:
-    """Return the form of the numbers in a file with these first bytes; None if it belongs to no known family."""
+    """Return the number format of a file with these first bytes; None if it belongs to no known family."""
     for form in (Form(width, order) for width in (4, 8) for order in "<>"):
         if len(head) < CONTROL * form.width:
             continue
@@ -135,7 +135,7 @@ class Words:
         return at + size <= len(self._content)
 
     def damaged(self, content: str) -> FormatError:
-        """Return the error for a file whose content contradicts its head."""
+        """Return the error for a file whose content contradicts its header."""
         cure = "the file is damaged, or of an unknown release; name the glstat, matsum or binout of the run"
         return FormatError(f"{self.source}: it has {content}; {cure}")
 

@@ -1,4 +1,4 @@
-"""LS-DYNA d3thdt: a d3plot of selected nodes and elements, usually written far more often."""
+"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, usually written far more often."""
 
 from __future__ import annotations
 

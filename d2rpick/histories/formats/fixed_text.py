@@ -1,4 +1,4 @@
-"""Reader of solver text files that consist of blocks with fixed columns.
+"""Read solver text files that consist of blocks with fixed columns.
 
 glstat and matsum contain one block for each state. Most blocks of a file have the same lines, hence the same number
 of bytes. So a block is parsed line by line once; the blocks after it are only compared with it, byte by byte where
@@ -44,7 +44,7 @@ _LINE: Final = 1 << 10  # bytes; the first line of a block is shorter
 
 
 class Blocks(Database):
-    """The whole states of a text file of blocks; each format derives its `Database` from it.
+    """The complete states of a text file of blocks, from which each format derives its `Database`.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # A run of at least this many blocks remembers which bytes differ between them, which then is little memory.
+    # With at least this many equal blocks, their differing bytes are stored, which needs little memory then.
     many = 64
-    batch = 1 << 14  # numbers converted together, which stay in the cache
+    batch = 1 << 14  # numbers converted at once, which fit into the cache
 
     def __init__(
         self,
@@ -91,11 +91,11 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        self._trusted = False  # True once part of each block was compared for a request
-        # By the start of a run of many blocks: bits that vary between its blocks.
+        self._trusted = False  # True after a request compared a part of each block
+        # Bits that vary between the blocks of a long run of equal blocks, by its start.
         self._varied: dict[int, Bytes] = {}
         self._asked_ahead = tuple(ahead)
-        # By the start of such a run: the numbers copied from its blocks, as printed.
+        # Numbers copied from the blocks of such a run, as printed, by its start.
         self._ahead: dict[int, Fields] = {}
         self._walk()
         if not self._compared and not self._is_even():
@@ -116,7 +116,7 @@ class Blocks(Database):
     def numbers(
         self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()
     ) -> Samples:
-        """Return these numbers of all states, shape (states, len(names)).
+        """Return the named numbers of all states, shape (states, len(names)).
 
         ``anchors`` are, for each number, the field or line from which on the text is compared before the number is
         trusted; they are used in files that were not compared in full when they were opened.
@@ -128,7 +128,7 @@ class Blocks(Database):
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
-            # A second request is usually followed by more, so all are compared once.
+            # A second request is usually followed by more, so all blocks are compared once.
             self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
@@ -145,7 +145,7 @@ class Blocks(Database):
             if run.start in self._varied:
                 self._read(values[rows], run, offsets, taken.get(run.start))
                 is_scattered[rows] = False
-            else:  # write the addresses first; the numbers replace them below
+            else:  # offsets are written first, and replaced by the numbers below
                 np.add(
                     _compute_starts(run, 0, run.repeats),
                     offsets,
@@ -162,7 +162,7 @@ class Blocks(Database):
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Use the last state although the file ends within it, if it contains these numbers and a line after them."""
+        """Use the last state of a truncated file if it has these numbers and a line after them."""
         if self.rest is None:
             return
         offsets = [
@@ -185,30 +185,30 @@ class Blocks(Database):
         The states after it tell whether the last one is whole, and which of those with the same printed time is the
         newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not whole.
         """
-        times = self.numbers([self._grammar.time])[:, 0]
-        state = times.size - 1
-        for _ in range(2):
-            earlier = np.flatnonzero(times[: state + 1] < times[state])
-            state = int(earlier[-1]) if earlier.size else 0
         first, begin, end = self._find(self._begin), self.tail, len(self._data)
+        head = self._data[: self.tail if first is None else first]
+        times = self.numbers([self._grammar.time])[:, 0]
         if times.size:
+            state = times.size - 1
+            for _ in range(2):
+                earlier = np.flatnonzero(times[: state + 1] < times[state])
+                state = int(earlier[-1]) if earlier.size else 0
             run, number = self._run_of(state)
             begin = run.start + number * run.stride
             last_run, number = self._run_of(times.size - 1)
             last_used = last_run.start + number * last_run.stride
             if self.rest is not None and last_used == self.rest.start:
                 end = last_used
-        head = self._data[: self.tail if first is None else first]
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
-        """Return a piece of the whole lines of the file."""
+        """Return a piece of the complete lines of the file."""
         return self._data[start : min(start + size, self._end)]
 
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of a run of many blocks, using those that were copied; read what never changes only once."""
+        """Read the numbers of many equal blocks, reuse copied numbers, and read constant numbers only once."""
         varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
@@ -228,7 +228,7 @@ class Blocks(Database):
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
-        """Return the numbers at these addresses, NaN for a field that is not a number."""
+        """Return the numbers at these offsets, NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
         return parse_fortran_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
@@ -251,7 +251,7 @@ class Blocks(Database):
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:
-        """Return the stretch of equal layouts that contains a state, and the state's index in it."""
+        """Return the sequence of equal layouts that contains a state, and the index of the state in it."""
         for run in self:
             if state < run.repeats:
                 return run, state
@@ -259,7 +259,7 @@ class Blocks(Database):
         raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
-        """Return the offsets of these numbers in the blocks of a run; raise FormatError if one is unsure."""
+        """Return the offsets of the named numbers in a sequence of blocks; FormatError if one is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
@@ -270,10 +270,10 @@ class Blocks(Database):
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
 
-    # How blocks are found
+    # How blocks are found.
 
     def _walk(self) -> None:
-        """Find all runs of blocks; leave out blocks that are not whole."""
+        """Find all sequences of blocks; leave out incomplete blocks."""
         self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
@@ -301,13 +301,13 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        """Return True if a block has the last number of the block before, or is known to be whole alone."""
+        """Return True if a block has the last number of the block before, or is complete by itself."""
         if previous is None:
             return self._grammar.whole(layout)
         return previous.last in layout.fields
 
     def _leave_out(self, block: Stretch, is_last: bool) -> None:
-        """Leave out a block that is not whole, with a note."""
+        """Leave out an incomplete block, with a note."""
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
@@ -318,7 +318,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Try the recent layouts; return example, stride and count of the blocks that have one of them, or None."""
+        """Return example, stride and count of blocks with one of the recent layouts; None for another layout."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -377,7 +377,7 @@ class Blocks(Database):
         return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
-        """Count the blocks like the example; remember the bits that vary and copy the numbers needed first."""
+        """Count the blocks like the example; store the varying bits and copy the numbers needed first."""
         varied = np.zeros_like(literal)
         fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
@@ -406,7 +406,7 @@ class Blocks(Database):
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Return True if all blocks have, from the first anchor to the last number, the text of their examples.
+        """Return True if all blocks equal their examples from the first anchor to the last number.
 
         Return False unchecked if that is most of a block: comparing whole blocks costs no more.
         """
@@ -417,12 +417,14 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return the same as `_alike` for one run of blocks."""
+        """Return the result of `_alike` for one sequence of blocks."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        end = int(offsets.max()) + self._grammar.width + 1  # with the next character
+        end = (
+            int(offsets.max()) + self._grammar.width + 1
+        )  # the character after the number must be there, too
         text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride
@@ -448,7 +450,7 @@ class Blocks(Database):
         )
 
     def _compare_in_full(self, names: Sequence[Hashable]) -> None:
-        """Compare all blocks in full; raise FormatError if there are other states than before."""
+        """Compare all blocks completely; raise FormatError if the states differ from those found before."""
         states = self.states
         is_complete = self.complete
         notes = self.notes
@@ -459,7 +461,7 @@ class Blocks(Database):
             raise FormatError(f"{self.source}: states overlap, the file is damaged")
 
     def _find(self, position: int) -> int | None:
-        """Return the address of the next line that begins a block."""
+        """Return the offset of the next line that begins a block."""
         start = self._grammar.start
         if position == 0 and self.text(0, len(start)) == start:
             return 0
@@ -468,7 +470,7 @@ class Blocks(Database):
 
 
 def _compute_starts(run: Stretch, first: int, end: int) -> Addresses:
-    """Return the addresses of the blocks ``first`` to ``end - 1`` of a run, shape (end - first, 1)."""
+    """Return the offsets of the blocks ``first`` to ``end - 1`` of a sequence, shape (end - first, 1)."""
     return run.start + run.stride * np.arange(first, end)[:, np.newaxis]
 
 

@@ -1,4 +1,4 @@
-"""LS-DYNA glstat: one block of ``label....... value`` lines per state, for the model as a whole.
+"""Read LS-DYNA's glstat: one block of ``label....... value`` lines per state, for the whole model.
 
 A label occupies columns 2-32, padded with dots; its value is right-justified in columns 33-46. Labels are compared as
 a whole: ``internal energy`` also ends ``eroded internal energy``. A block begins at its ``time....`` line; the line
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Part of the internal energy; read in advance since it is used whenever it is there.
+# Part of the internal energy; read in advance, because it is used whenever it exists.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # bytes that contain the head and the first state
+_NEAR: Final = 4096  # bytes that contain the header and the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 # The last line of a state in every known glstat; mass scaling may add lines after it.
@@ -43,14 +43,14 @@ _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTI
 # A value; each rigid wall has its own line with the number of the wall after the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
-# What may change in other lines: numbers, and the element that controls the time step.
+# Variable text in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
 )
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the start of a file, looks like a glstat; a head without states is enough."""
+    """Return True if ``data``, the start of a file, looks like a glstat; a header without states is enough."""
     if b"\n" + _START in data or data.startswith(_START):
         return True
     _, version, begin = read_head_of_listing(data)
@@ -59,7 +59,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run; the selection gives the lines that its last state must have."""
+    """Open each file as a leg of the run; the selection names the lines that its last state must have."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -83,7 +83,7 @@ class Glstat(Blocks):
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        # a line that is not there is reported when it is read
+        # a missing line is reported when it is read
         with suppress(FormatError):
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
@@ -95,7 +95,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        self._even = True  # until a state lacks a line of the others
+        self._even = True  # becomes False if a state lacks a line of the others
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
@@ -112,7 +112,7 @@ class Glstat(Blocks):
     def _pass_over(
         self, names: list[str], needed_names: list[str]
     ) -> dict[str, Samples]:
-        """Read lines in one pass; if a state lacks one, read only the needed ones and leave the error to later."""
+        """Read lines in one pass; if a state lacks one, read only the required ones."""
         try:
             columns = self.numbers(names)
         except FormatError:
@@ -140,7 +140,7 @@ def _describe_glstat_block(
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
-        # a line between these lost some of its columns
+        # a truncated line in between may belong to another state
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()

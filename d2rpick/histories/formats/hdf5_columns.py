@@ -1,4 +1,4 @@
-"""The columns of an HDF5 file (datasets, matrices, compound types, tables of pandas) and their values.
+"""Find the columns of an HDF5 file (datasets, matrices, compound types, pandas tables) and read their values.
 
 The library returns zeros for data that were never written, and does not notice a damaged type: both are checked here.
 A changed byte in data without a checksum (`fletcher32`, or the one of gzip) cannot be detected.
@@ -32,12 +32,12 @@ _BOOKKEEPING: Final = ("_i_", "#")  # index trees of PyTables, references of MAT
 _ERF_BLOCK: Final = "/erfblock"
 _WIDEST: Final = 64  # columns; a wider matrix without names is not a table of histories
 
-# Share of a file; a smaller dataset is copied, since a view of it would keep the whole file in memory.
+# Share of a file; smaller datasets are copied, since a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
 class Column(NamedTuple):
-    """One column: the ``path`` by which a user names it, and where it is in the file.
+    """One column: the ``path`` by which a user names it, and its position in the file.
 
     ``field`` is the member of a compound dataset, ``place`` the (axis, index) of the column in a matrix.
     """
@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if data of a dataset are missing (they would read as zeros) or have a type that is damaged."""
+    """Raise FormatError if data of a dataset are missing (they would read as zeros) or their type is damaged."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
@@ -115,7 +115,7 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError for numbers of a type that HDF5 does not define: a changed byte would change them all."""
+    """Raise FormatError for number types that HDF5 does not define: a changed byte would change all numbers."""
     for kind in _list_number_types(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _list_standard_types()):
             raise FormatError(
@@ -154,8 +154,10 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
-    """Return the numbers of a dataset; one that is contiguous and most of the file is a view of ``content``."""
-    start = dataset.id.get_offset()  # None for data in chunks or in other files
+    """Return the numbers of a dataset; a contiguous one that fills most of the file is a view of ``content``."""
+    start = (
+        dataset.id.get_offset()
+    )  # there is no offset for data in chunks or in other files
     if start is None:
         return dataset[()]
     if not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
@@ -165,7 +167,7 @@ def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
 
 
 def check_finite(values: Any, path: str, source: str) -> Samples:
-    """Return ``values`` as read-only doubles, which callers can share; raise FormatError unless all are finite."""
+    """Return ``values`` as read-only doubles that callers can share; FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
     is_finite = np.isfinite(numbers)
     if not is_finite.all():
@@ -181,7 +183,9 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    read_groups: list[str] = []  # groups that a reader of their layout read as a whole
+    read_groups: list[
+        str
+    ] = []  # groups that are read completely by a reader of their layout
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if any(step.startswith(_BOOKKEEPING) for step in name.split("/")):
@@ -204,7 +208,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
 
 
 def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
-    """Yield the columns of a dataset: members of a compound type, a vector, or the columns of a matrix."""
+    """Yield the columns of a dataset: members of a compound type, a vector, or columns of a matrix."""
     import h5py
 
     plan = dataset.id.get_create_plist()
@@ -234,7 +238,7 @@ def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Yield the columns of a matrix along the axis with as many entries as there are titles, or the shorter one."""
+    """Yield the columns of a matrix along the axis whose length is the number of titles, or the shorter axis."""
     rows, width = dataset.shape
     if rows == width:
         return
@@ -270,7 +274,9 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]  # without the zone
+    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[
+        0
+    ]  # path of the variable without the zone
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
     numbers = [] if entities is None else np.ravel(entities[()]).tolist()
@@ -389,7 +395,7 @@ _PANDAS: Final = {
 
 
 def _read_attribute_text(value: object) -> str:
-    """Return an attribute as text, however it was stored; empty if it is not text."""
+    """Return an attribute as text, regardless of its type; empty if it is not text."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):

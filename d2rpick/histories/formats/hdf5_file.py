@@ -1,4 +1,4 @@
-"""HDF5: time and energy columns from any layout, and binouts saved by lasso-python.
+"""Read HDF5 files: time and energy columns of any layout, and binouts saved by lasso-python.
 
 A file with the branches of a binout is treated as a saved binout. Of any other file, columns are chosen by their
 paths; without a choice, the only column that fits is used, and if several fit the message lists them.
@@ -54,12 +54,12 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
-# Offset of the end-of-file address in superblocks of version 0 to 3 with addresses of eight bytes, as all writers use.
+# Offset of the end-of-file address in superblocks of version 0 to 3 with 8-byte addresses, as all writers use.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# Time-out of a reading: 60 s plus 1 s per 100 kB.  A longer reading means a cyclic B-tree in a damaged file.
+# Time-out of a read: 60 s plus 1 s per 100 kB. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
-_SLOWEST: Final = 100_000  # bytes per second
+_SLOWEST: Final = 100_000  # slowest expected reading speed [bytes/s]
 _USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
 
 
@@ -69,14 +69,14 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a leg of the run; columns of the selection take precedence over those of a saved binout."""
+    """Open each file as a leg of the run; selected columns take precedence over those of a saved binout."""
     return [_open_leg(source, selection) for source in sources]
 
 
 def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as columns."""
     _import_library(source.name)
-    # In memory whatever its size: the library crashes on some mixtures of two versions of a file.
+    # In memory regardless of its size: the library crashes on some mixtures of two versions of a file.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
@@ -99,7 +99,7 @@ def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout by their paths; a `Database` without parts."""
+    """The columns of an HDF5 file of any layout by path; a `Database` without parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -120,7 +120,7 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column named like an internal energy, or next to the time; FormatError lists them otherwise."""
+        """The only column named like an internal energy, or next to the time; otherwise FormatError lists them."""
         return _find_only_energy(self._columns, self._named_time, self.source).path
 
     def find(self, wanted: str) -> str:
@@ -160,7 +160,7 @@ class Columns(Database):
         return self._load(column)
 
     def _check_own_times(self, column: Column) -> None:
-        """Raise FormatError if the group of a column has times that are not those of the energy."""
+        """Raise FormatError if the group of a column has other times than the energy."""
         times_of_group = [
             time
             for time in self._columns
@@ -281,7 +281,7 @@ class PartGroup(Database):
         return values[:, [part_ids.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
-        """Return the dataset ``name`` in this ``shape``; it may be stored without the axes of length 1."""
+        """Return the dataset ``name`` in this ``shape``; axes of length 1 may be missing."""
         dataset = group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
@@ -367,7 +367,7 @@ def _find_only_time(columns: Sequence[Column], energy: Column, source: str) -> C
 def _choose_only_column(
     fitting: Sequence[Column], columns: Sequence[Column], purpose: str, source: str
 ) -> Column:
-    """Return the only fitting column; raise FormatError with the columns to choose from otherwise."""
+    """Return the only matching column; otherwise raise FormatError with the columns to choose from."""
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
@@ -390,7 +390,7 @@ def _import_library(source: str) -> None:
 
 @contextmanager
 def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
-    """Open the file; turn any error of h5py for a damaged file into a FormatError."""
+    """Open the file; convert any error of h5py for a damaged file into a FormatError."""
     import h5py
 
     try:
@@ -403,11 +403,11 @@ def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         ) from error
 
 
-# Checks for damage at which the library crashes or loops endlessly.
+# Checks for damage that makes the library crash or loop endlessly.
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
-    """Raise FormatError if a file is cut or too large, or if the library would crash on it.
+    """Raise FormatError if a file is truncated or too large, or if the library would crash on it.
 
     The file is read once in a child process whose time is limited to ``seconds`` plus 1 s per 100 kB, since a reading
     that crashes or never ends there would do so here.
@@ -436,7 +436,7 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
-    """Raise FormatError if the size of a file is not the one in its own header."""
+    """Raise FormatError if the size of a file differs from the one in its header."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -447,7 +447,7 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
         or len(head) < offset + _ADDRESS_SIZE
         or head[_SIZE[version]] != _ADDRESS_SIZE
     ):
-        return  # the library reports what is wrong with it
+        return  # the library reports the problem
     (end,) = struct.unpack_from("<Q", head, offset)
     if size not in (end, end + base):
         raise FormatError(
@@ -463,7 +463,7 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
 
 
 def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) -> None:
-    """Read all that could crash the library, write the message of a FormatError to ``write_end``, and exit."""
+    """Read all data that could crash the library, write the message of a FormatError to ``write_end``, and exit."""
     try:
         import faulthandler
         import resource
@@ -484,7 +484,7 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) ->
 
 
 def _read_all_data(file: BinaryIO, source: str) -> None:
-    """Read the description of all data, and data in chunks; raise FormatError if the bounds are exceeded."""
+    """Read the description of all data, and data in chunks; raise FormatError beyond the limits."""
     import h5py
 
     size = _head_and_size(file)[1]

@@ -1,4 +1,4 @@
-"""The lines above the rows of a table: names and units of the columns, and the title of a curve."""
+"""Read the lines above the rows of a table: names and units of the columns, and the title of a curve."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 _SHORT: Final = 60  # characters of a line that a message quotes
-# The first columns of th_to_csv of OpenRadioss in every version; after them, some versions write more or fewer names
-# than columns (OpenRadioss/Tools, issue 98).
+# The first columns of OpenRadioss' th_to_csv in every version.
+# After them, some versions write more or fewer names than columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -41,7 +41,7 @@ _SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Names and units of the columns, if there are any; only the first ``sure`` columns are sure of their name."""
+    """Names and units of the columns, if there are any; only the first ``sure`` columns have certain names."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -105,7 +105,7 @@ def quote_start(line: str) -> str:
 
 
 def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
-    """Return the number of columns that are sure of their name, None for all; raise FormatError if there is none."""
+    """Return the number of columns with certain names, None for all; raise FormatError if there is none."""
     if len(names) == columns:
         return None
     if tuple(map(normalise_name, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
@@ -119,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names, from the last one upwards, until all columns have different names; [] if one row is enough.
+    """Join rows of names, from the last one upwards, until all names differ; [] if one row is enough.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str
 
 
 def _join_names(upper: str, lower: str) -> str:
-    """Join the names of a column from two rows; the name of a time stands alone."""
+    """Join the names of a column from two rows; the name of a time stays alone."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
 
@@ -164,7 +164,7 @@ def _fill_from_left(cells: Sequence[str]) -> list[str]:
 def _split_rows(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> Iterator[list[str]]:
-    """Yield the cells of each header line; a quoted name may go on over a line end."""
+    """Yield the cells of each header line; a quoted name may extend over a line end."""
     pending = ""
     for line in lines:
         if not pending and is_skipped(line):

@@ -1,4 +1,4 @@
-"""The layout of a table in a text: separator, decimal sign, first row, names and units."""
+"""Find the layout of a table in a text: separator, decimal sign, first row, names and units."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-# Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.  A comma as both can be read
-# only if the numbers are in quotes.
+# Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
+# A comma as both can be read only if the numbers are in quotes.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
@@ -38,7 +38,7 @@ _FORMS = (
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Lines in which the rows are searched: first more than most headers have, in the end more than any header has.
+# Numbers of lines in which rows are searched: first more than most headers have, finally more than any has.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -107,7 +107,7 @@ def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
 
 
 def find_layout(text: Text) -> Layout:
-    """Find the layout of a table by its first lines; use a last line without end only if there is no other row.
+    """Find the layout of a table by its first lines; a last line without end is used only if there is no other row.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
 
 
 def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
-    """Return the error for a text without a table; it quotes the first line that may be a row, else the first line."""
+    """Return the error for a text without a table; it quotes the first likely row, or the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
     ]
@@ -164,6 +164,8 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     below = "below" if text.is_short else f"in the first {HEAD} lines"
     problem = f"{text.name}:{number}: {quote_start(line)} and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
+    if rows and has_number(line.strip(), ".", ""):
+        cure = "this file has one column; add the times"
     return FormatError(f"{problem}; expected a table of time and energy; {cure}")
 
 
@@ -189,7 +191,7 @@ def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | N
 def _find_rows(
     sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool
 ) -> Layout | None:
-    """Return the layout in which most lines are rows, with words or without; else any one with rows of numbers only."""
+    """Return the layout in which most lines are rows, with words or without; else one with rows of numbers only."""
     forms: Sequence[tuple[str | None, str]]
     if separator:
         forms = [(separator, decimal) for decimal in ".," if separator != decimal]
@@ -236,14 +238,14 @@ def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
     """Return, for each cell of a row, True if it is a number or missing; an empty tuple if the line is not a row."""
-    if len(cells) < 2:  # the most frequent case: a wrong separator
+    if len(cells) < 2:  # most often: a wrong separator
         return ()
     written = [form.number(cell) is not None for cell in cells]
     numbers = tuple(
         number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
     )
     words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
-    # "| a title |" is no row.
+    # "| a title |" is not a row
     is_row = (
         any(written)
         and sum(numbers) > 1
@@ -253,7 +255,7 @@ def _find_numbers_in_row(
 
 
 def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
-    """Return True if a row has as many cells as the common kind, and its numbers at least there."""
+    """Return True if a row has as many cells as the common kind, and numbers at least in its number cells."""
     return len(kind) == len(common) and all(
         is_number or not is_commonly_number
         for is_number, is_commonly_number in zip(kind, common, strict=True)
@@ -263,7 +265,7 @@ def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
 def _refuse_odd_rows(
     source: str, lines: Sequence[str], first: int, table: Layout
 ) -> None:
-    """Raise FormatError if a line above the rows begins with a number: it is a row unlike the others, not a header."""
+    """Raise FormatError if a line above the rows begins with a number: it is a different row, not a header."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:
@@ -276,7 +278,7 @@ def _refuse_odd_rows(
 
 
 def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
-    """Raise FormatError for rows like ``0,05,1,25``: integers with leading zeros are the decimals of numbers."""
+    """Raise FormatError for rows like ``0,05,1,25``: integers with leading zeros are decimals of numbers."""
     if table.separator != ",":
         return
     for number, line in enumerate(

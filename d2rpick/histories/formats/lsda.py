@@ -1,4 +1,4 @@
-"""LSDA, the container of LS-DYNA's binout: directories of typed variables, found by walking the records.
+"""Read LSDA, the container of LS-DYNA's binout: directories of typed variables, found by reading all records.
 
 The file begins with the length of its header, the sizes of length, offset, command and type fields, the byte order
 (1: little-endian) and the float format. Records follow, each of length, command and body:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # symbol tables and their entries
+_TABLES: Final = range(4, 8)  # types of records: symbol tables and their entries
 _LONGEST: Final = 1 << 32  # bytes; a symbol table is shorter
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
@@ -52,11 +52,11 @@ _TYPES: Final = {
     10: "f8",
 }
 
-# Bytes that contain record head, type and name of a variable; more bytes around them are read together.
+# Bytes that contain header, type and name of a variable; more bytes around them are read at once.
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# From this number of repetitions on, comparing arrays is faster than walking the records.
+# From this number of repetitions on, comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
 # Names of state directories: d and the number of the state, with 6 to 18 digits (which fit an int64).
@@ -73,14 +73,14 @@ class Variable:
 
 
 class DirectoryLayout(NamedTuple):
-    """The variables of a directory; ``doubled`` are the names that occur in it more than once."""
+    """The variables of a directory; ``doubled`` are the names that occur more than once."""
 
     variables: dict[str, Variable]
     doubled: frozenset[str]
 
 
 class _Form(NamedTuple):
-    """The bytes of a directory's records as one integer, to recognise the same records in another directory at once.
+    """The bytes of a directory's records as one integer, for a quick comparison with another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -93,7 +93,7 @@ class _Form(NamedTuple):
 
 
 class Lsda:
-    """The directories of one file, as a walk over its records finds them.
+    """The directories of one file, found by reading its records.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class Lsda:
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
-        """Return where a later read can begin: at the last but one state of that branch of some whose state is first.
+        """Return where a later read can begin: at the last but one state of the branch whose state is first.
 
         The head repeats the metadata of all wanted branches, each behind a change to its directory.
         """
@@ -195,18 +195,18 @@ class Lsda:
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        """Walk the records from a byte offset on, and collect the directories of the wanted branches."""
+        """Read the records from a byte offset on, and collect the directories of the wanted branches."""
         data = self.data
         unpack = self._head.unpack_from
         head = self._head.size
         size, name_length = len(data), head + self._type.size
-        near, base = b"", 0  # the bytes around the position
+        near, base = b"", 0  # bytes around the current position
         path: tuple[str, ...] = ()
         number = -1
         start = position
         records = list[bytes]()
         command = 0
-        # where the last state of each branch began
+        # start of the last state of each branch
         anchors: dict[tuple[str, ...], int] = {}
         heads: set[bytes] = set()
         while position + head <= size:
@@ -262,7 +262,7 @@ class Lsda:
             self.unfinished = "/".join(path[:-1])
 
     def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
-        """Return True if the file was cut in the record that begins ``last_bytes``; else the last record is damaged.
+        """Return True if the file was truncated in the record ``last_bytes``; otherwise that record is damaged.
 
         Records of a state have the heads of the last state, but symbol tables differ from each other.
         """
@@ -274,7 +274,7 @@ class Lsda:
     def _leave(
         self, path: tuple[str, ...], number: int, start: int, records: list[bytes]
     ) -> None:
-        """Keep the variables of the directory that the walk leaves, if they are wanted."""
+        """Store the variables of the directory that ends here, if they are wanted."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
             records.pop()  # a symbol table after the variables is not part of the layout
         branch = "/".join(path[:-1])
@@ -295,7 +295,7 @@ class Lsda:
             self.odd[branch].append(path[-1])
 
     def _layout(self, records: list[bytes]) -> DirectoryLayout:
-        """Return the variables that the record heads of a directory define; a head that makes no sense defines none."""
+        """Return the variables defined by the record headers of a directory; an invalid header defines none."""
         variables: dict[str, Variable] = {}
         doubled = set()
         offset = 0
@@ -317,7 +317,7 @@ class Lsda:
         return DirectoryLayout(variables, frozenset(doubled))
 
     def _form(self, heads: tuple[bytes, ...]) -> _Form:
-        """Return the form of a directory with these record heads."""
+        """Return the form of a directory with these record headers."""
         mask, fixed = bytearray(), bytearray()
         for head in heads:
             values = bytes(self._head.unpack_from(head)[0] - len(head))
@@ -338,7 +338,7 @@ class Lsda:
         return None
 
     def _skip(self, previous: int | None, position: int) -> int:
-        """Return the bytes to skip if the records from ``previous`` to ``position`` repeat; keep the skipped states.
+        """Return the bytes to skip if the records from ``previous`` to ``position`` repeat; store the skipped states.
 
         The last repetition is left to the walk, which then goes on as usual.
         """
@@ -352,14 +352,14 @@ class Lsda:
         times, steps = count_repetitions(self.data, previous, fixed, numbers)
         if times < 2:
             return 0
-        # A number ends its record: the next byte is where the state's records start.
+        # A number ends its record: the next byte is where the records of the state start.
         growth = {
             previous + at + width: step
             for (at, width), step in zip(numbers, steps, strict=True)
         }
         ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
-            if not visits:  # a branch that the file does not have
+            if not visits:  # a branch that the file lacks
                 continue
             last_visits = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = last_visits[np.isin(last_visits[:, 1], [*growth])]
@@ -371,7 +371,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Return True if a search for repetitions is worthwhile, by a quick look at the records one stride apart."""
+        """Return True if a search for repetitions is worthwhile, by a quick comparison of records one stride apart."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]
@@ -381,7 +381,7 @@ class Lsda:
     def _pattern(
         self, begin: int, end: int
     ) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
-        """Return which bytes between two addresses are structure (255), not data, and where states are numbered."""
+        """Return a mask of the structure bytes (255) between two offsets, and the positions of state numbers."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
         block = self.data[begin:end]
@@ -438,7 +438,7 @@ def recognises(head: bytes) -> bool:
 
 
 def _resolve_path(path: tuple[str, ...], change: str) -> tuple[str, ...]:
-    """Return the directory to which a change of directory leads.
+    """Return the directory that a change of directory leads to.
 
     Examples
     --------

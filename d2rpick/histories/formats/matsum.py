@@ -1,4 +1,4 @@
-"""LS-DYNA matsum: one block per state, with three or four lines for each part.
+"""Read LS-DYNA's matsum: one block per state, with three or four lines for each part.
 
 The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; which names
 there are depends on the version. A legend at the top lists the titles by part number. A part may be in some states
@@ -38,7 +38,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-# next to each other in the file
+# Quantities that are adjacent in the file.
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
@@ -68,7 +68,9 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
+_CHANGING: Final = re.compile(
+    rb" {0,12}[+-]?\d[\d+-]*"
+)  # numbers in lines that may vary between states
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
@@ -244,7 +246,7 @@ def _write_part(
 
 
 def _has_all_parts(legend: Mapping[int, str], layout: BlockLayout) -> bool:
-    """Return True if the only state of a file has all parts of the legend; without a legend this cannot be known."""
+    """Return True if the only state of a file has all parts of the legend; False without a legend."""
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
@@ -263,9 +265,9 @@ def _describe_matsum_block(
         if line[1] is not None:
             part = _find_part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
-            if doubled:  # two groups of lines of one part: neither is sure
+            if doubled:  # with two groups of lines for one part, neither is reliable
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            # with the line end before it
+            # the offset includes the line end before the line
             fields[part, _MAT] = UNSURE if doubled else line.start() - 1
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())

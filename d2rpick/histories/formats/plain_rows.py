@@ -1,4 +1,4 @@
-"""Rows of numbers that are all alike, read at once: with any pandas, each number is exactly what `float` reads."""
+"""Read uniform rows of numbers at once; with any pandas version the result is that of `float`."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Samples
 
-_UNIT_SEPARATOR: Final = "\x1f"  # no table has this control character
-# How far a number of the fast pandas reader may be off, relative to it: that reader uses 17 digits, leading zeros too.
+_UNIT_SEPARATOR: Final = "\x1f"  # a control character that no table has
+# Largest relative error of the fast pandas reader, which uses 17 digits including leading zeros.
 _ROUNDED: Final = 1e-9
 
 
 def read_plain_rows(
     piece: bytes, layout: Layout, used: Sequence[int], *, is_large: bool
 ) -> Samples | None:
-    """Read the columns ``used`` of whole lines, shape (rows, len(used)).
+    """Read the columns ``used`` of complete lines, shape (rows, len(used)).
 
     Return None unless each line is a row with all its cells. ``is_large`` states that the piece belongs to a large
     text, for which importing pandas pays.
@@ -42,10 +42,10 @@ def read_plain_rows(
     separator_bytes = (layout.separator or "\n").encode("latin-1")
     closed = piece[: piece.index(b"\n")].endswith(separator_bytes)
     if layout.separator and (closed or sorted(used) != read_columns):
-        # otherwise the parser makes sure that each row has its cells
+        # otherwise the parser checks that each row has its cells
         if not _has_all_cells(piece, layout):
             return None
-        # a comment would show in the first column, so it is read too
+        # a comment would show in the first column, so that is read too
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
@@ -122,7 +122,7 @@ def _read_with_pandas(
 
 
 def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
-    """Read rows of numbers exactly with scipy; return None if scipy fails or disagrees with the numbers ``fast``.
+    """Read rows of numbers exactly with scipy; None if scipy fails or contradicts the numbers ``fast``.
 
     Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
     result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
@@ -138,7 +138,7 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # a number that is not finite does not agree
+    with np.errstate(invalid="ignore"):  # only finite numbers can agree
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 

@@ -1,4 +1,4 @@
-"""The records of Radioss time histories in both containers: binary, and the text of ``/TFILE/3``.
+"""Read the records of Radioss time histories in both containers: binary, and the text of ``/TFILE/3``.
 
 A binary record is its length, its bytes and its length again, all big-endian. A record of text begins with a line
 ``ZZZZZEOR`` that gives its numbers of integers (I), characters (C) and reals (R); lines of fixed columns follow: ten
@@ -32,11 +32,11 @@ _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n"
 _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
-_LONG, _SHORT = 10, 5  # columns of integers
+_LONG, _SHORT = 10, 5  # columns of an integer, in the two formats
 _STARS: Final = b"*" * _SHORT  # printed by Fortran for a number that is too long
-_ROOM: Final = 1024  # bytes; a record of the head is shorter, apart from its integers
+_ROOM: Final = 1024  # bytes; a header record is shorter, apart from its integers
 _RUN_TITLE: Final = 72  # characters of the title of the run in text (80 in binary)
-_REAL: Final = 16  # columns of a real, whose point is in the fourth
+_REAL: Final = 16  # columns of a real, whose point is in the fourth column
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
 _JUDGED: Final = 100  # last times by which the precision is judged
@@ -71,7 +71,7 @@ def open_records(data: Content, source: str) -> Records:
 
 
 class Records:
-    """The layout of the records in a binary file; ``at`` is the byte of the next record of the head."""
+    """The layout of the records in a binary file; ``at`` is the byte of the next header record."""
 
     width = WIDTH  # bytes of a number in a state
 
@@ -79,7 +79,7 @@ class Records:
         self._data, self.at = data, at
 
     def take(self) -> bytes | None:
-        """Return the next record of the head and move on; None if there is no complete record."""
+        """Return the next header record and advance; None if there is no complete record."""
         begin = self.at + WIDTH
         if begin > len(self._data):
             return None
@@ -101,7 +101,7 @@ class Records:
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return offsets and bytes of the marks that every record with ``count`` reals has, all of one length."""
+        """Return offsets and bytes of the marks that every record with ``count`` reals has, of equal length."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
@@ -145,7 +145,7 @@ class _TextRecords(Records):
     def _packed(
         self, body: bytes, first: int, characters: int, last: int
     ) -> bytes | None:
-        """Return a record in binary form; None if it has not the content that its first line announces."""
+        """Return a record in binary form; None if its content differs from its first line."""
         if not characters:
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
@@ -186,7 +186,7 @@ class _TextRecords(Records):
         return values
 
     def digits(self, times: Samples) -> int:
-        """Return the digits of single precision if all times are singles: then the solver computed in it."""
+        """Return the digits of single precision if all times are singles, which the solver used then."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()

@@ -1,4 +1,4 @@
-"""Radioss and OpenRadioss time histories, T01, T02, ... (one for each leg of a run), binary or text.
+"""Read time histories of Radioss and OpenRadioss, T01, T02, ... (one per leg of a run), binary or text.
 
 The head names the run, gives the numbers of parts, materials, properties, subsets, groups and global variables, and
 describes each of them. Each state is a record with the time, and one record each for the global variables, the parts,
@@ -91,10 +91,10 @@ class _Head(NamedTuple):
     version: str
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
-    # number of a part's variable among the variables of all parts
+    # index of a part's variable among the variables of all parts
     columns: dict[tuple[int, str], int]
-    counts: tuple[int, ...]  # of numbers in the records of one state
-    groups: tuple[_Group, ...]  # their records are the last ones of a state
+    counts: tuple[int, ...]  # numbers in the records of one state
+    groups: tuple[_Group, ...]  # groups whose records are the last ones of a state
 
 
 def recognises(head: bytes) -> bool:
@@ -118,7 +118,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     legs = [history for history in histories if history.channels] or histories
     for history in histories:
         if history not in legs:
-            note = f"{history.source} was left out: without global values it is no leg of the run but an additional"
+            note = f"{history.source} was left out: without global values it is no engine run but an additional"
             legs[0].notes += (
                 f"{note} time history (/ATFILE); name it alone to use its parts",
             )
@@ -149,7 +149,7 @@ class TimeHistory(Database):
         self._records = open_records(self._data, source)
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
-        # only parts of a card /TH/PART have variables
+        # only parts in a card /TH/PART have variables
         parts_with_variables = {id_ for id_, _ in head.columns}
         self.parts = tuple(
             part for part in head.parts if part.id in parts_with_variables
@@ -211,7 +211,7 @@ class TimeHistory(Database):
         return {self.source: ResumePoint(head, begin, len(self._data))}
 
     def size_until(self, time: float) -> int:
-        """Return the bytes of the head and of the states up to a time [time]."""
+        """Return the bytes of the header and of the states up to a time [time]."""
         return self._records.at + self._stride * int(
             np.searchsorted(self.time, time, side="right")
         )
@@ -233,7 +233,7 @@ class TimeHistory(Database):
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:
-        """Return the number of a part's variable in the record of the parts; raise FormatError if there is none."""
+        """Return the index of a part's variable in the record of the parts; raise FormatError if there is none."""
         column = self._head.columns.get((id_, quantity))
         if column is None:
             quantities = [name for part, name in self._head.columns if part == id_]
@@ -247,7 +247,7 @@ class TimeHistory(Database):
         return column
 
     def _columns(self, record: int, columns: Sequence[int]) -> Samples:
-        """Return some numbers of one record of each state, shape (n, columns)."""
+        """Return the selected numbers of one record of each state, shape (n, columns)."""
         offsets = [
             self._begins[record] + self._records.place(column) for column in columns
         ]
@@ -257,14 +257,14 @@ class TimeHistory(Database):
         return self._records.values(fields).reshape(self._states, len(columns))
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
-        """Return the addresses of some offsets in each of the first states, shape (states * offsets,)."""
+        """Return the byte offsets of numbers in each of the first states, shape (states * offsets,)."""
         return np.add.outer(
             self._records.at + self._stride * np.arange(states),
             np.array(offsets, np.int64),
         ).ravel()
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
-        """Count the whole states; the file may end within a state, but nothing else may be between states.
+        """Count the complete states; a truncated state may follow, but nothing else between states.
 
         Records have neither name nor number: if one is lost or inserted, no state of the file can be trusted.
         """
@@ -302,13 +302,13 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """The reader of the head, which takes its records one after the other."""
+    """The reader of the header, which takes its records one after the other."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        # bytes of a title, the same in all records; 0 until the first one was read
+        # bytes of a title, the same in all records; 0 until the first one is read
         self._title = 0
 
     def head(self) -> _Head:
@@ -424,7 +424,7 @@ class _HeadRecords:
         return number
 
     def _next(self, length: int | None = None) -> bytes:
-        """Read the next record; raise FormatError if it is not whole, or has not this length."""
+        """Read the next record; raise FormatError if it is incomplete, or has another length."""
         record = self._records.take()
         if record is None:
             raise self._broken("a complete record")
@@ -433,7 +433,7 @@ class _HeadRecords:
         return record
 
     def _broken(self, expected: str) -> FormatError:
-        """Return the error for a head that lacks what was expected."""
+        """Return the error for a header that lacks expected content."""
         at = self._records.at
         problem = f"{self._source}: {expected} was expected in the head of the time history near byte {at}"
         return FormatError(f"{problem}; the file is cut or damaged, copy it again")

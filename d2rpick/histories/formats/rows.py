@@ -1,4 +1,4 @@
-"""The numbers in the rows of a table: read together if all rows of a piece are alike, otherwise line by line."""
+"""Read the numbers in the rows of a table: at once if all rows of a piece are uniform, otherwise line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table in the requested order, and notes on lines below the table that were left out."""
+    """Columns (rows,) of a table in the requested order, and notes on omitted lines below the table."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -70,7 +70,7 @@ def find_line(
 def _read_tables(
     text: Text, begin: int, curve: _Curve
 ) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Yield line numbers and values (rows, used) of each piece; read line by line only if its rows are not alike."""
+    """Yield line numbers and values (rows, used) of each piece; read line by line only if rows differ."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = read_plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
@@ -101,7 +101,7 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """The state of reading a table: the last time, gaps, and what was found below the table."""
+    """State of reading a table: the last time, gaps, and lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
@@ -111,12 +111,14 @@ class _Curve:
         self._read: list[Samples] = []  # states of the earlier pieces
         self._current: list[list[float]] = []  # states of this piece so far
         self._below: _Below | None = None
-        self._repeated = 0  # states of the table that are repeated below it
+        self._repeated = (
+            0  # number of states of the table that are repeated below the table
+        )
         self._repeated_from = 0  # line of the first repeated state
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on what was left out below the table."""
+        """Notes on lines omitted below the table."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -127,12 +129,12 @@ class _Curve:
         return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Remember states (rows, used) of a piece that was read at once."""
+        """Store states (rows, used) of a piece that was read at once."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
     def keep_piece(self) -> None:
-        """Remember the states of a piece that was read line by line."""
+        """Store the states of a piece that was read line by line."""
         if self._current:
             self._read.append(np.array(self._current))
             self._current.clear()
@@ -206,7 +208,7 @@ class _Curve:
             self._read = [np.concatenate(self._read)]
         table = self._read[0]
         below = self._below
-        assert below is not None  # a line below the table was met before this row
+        assert below is not None  # a line below the table precedes this row
         is_first = np.array_equal(table[0], state)
         position = 0 if is_first else self._repeated
         is_started = position > 0 or is_first
@@ -220,7 +222,9 @@ class _Curve:
             return
         is_header = is_time(split_cells(below.text, self.layout.separator)[0])
         continues = state[0] > float(table[-1, 0])
-        if is_header or continues:  # the table goes on, so the line between is damaged
+        if (
+            is_header or continues
+        ):  # the table continues, so the line between is damaged
             raise below.error
         problem = (
             f"{self._name}:{number}: another table begins here, after line {below.line} "

@@ -1,4 +1,4 @@
-"""The lines of a text file, whatever its encoding and line ends, and the precision of its printed numbers."""
+"""Read the lines of a text file with any encoding and line ends, and the precision of its printed numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8: Final = b"\xef\xbb\xbf"
 
-# Lines in which the form of a text is searched; a form that these do not show is not found.
+# Lines in which the form of a text is searched.
 HEAD: Final = 10_000
 
 # Digits before and after the point, and the exponent.
@@ -30,7 +30,7 @@ _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 # Significant digits that restore every double, and the form of a number without an exponent.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# Every double keeps 15 significant digits; a format that prints so many is treated as lossless.
+# Every double keeps 15 significant digits; a format that prints as many is treated as lossless.
 _FULL = 15
 
 
@@ -40,11 +40,11 @@ class Text:
     A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # How much is read together.
+    # Amounts that are read at once.
     top = HEAD  # lines in which the form of the text is searched
     # bytes of a piece, whose cells then fit into the cache of the processor
     piece = 1 << 17
-    # A text of at most these bytes is used as a whole to find the printed precision.
+    # A text of at most this size is used completely to find the printed precision [bytes].
     short = 1 << 16
     some = 100  # lines sampled at the start, at the end and between of a longer text
     # Bytes of a piece of a large text: each call of pandas or scipy costs milliseconds.
@@ -54,18 +54,18 @@ class Text:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Address after the last line that has an end.
+        # Offset after the last line that has an end.
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first lines that have an end, as many as are searched for the form of the text."""
+        """The first lines with an end, as many as are searched for the form of the text."""
         return self._first[: self.top]
 
     @property
     def is_short(self) -> bool:
-        """True if ``head`` holds all lines (apart from a last one without end)."""
+        """True if ``head`` contains all lines (apart from a last one without end)."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -73,14 +73,14 @@ class Text:
         return list(islice(self.lines(0), self.top + 1))
 
     def place(self, line: int) -> int:
-        """Return the address of a line, counted from 0 [byte]; the end of the last line if there are fewer lines."""
+        """Return the offset of a line, counted from 0 [byte]; the end of the last line if there are fewer lines."""
         address = 0
         for _ in range(line):
             address = self._data.find(b"\n", address) + 1 or self._end
         return address
 
     def take_rest(self) -> None:
-        """Treat the last line, which has no end, as a whole line from now on."""
+        """Treat the last line, which has no end, as a complete line from now on."""
         self._end = len(self._data)
 
     @property
@@ -89,7 +89,7 @@ class Text:
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
-        """Yield whole lines from byte ``begin`` on, in pieces of many lines (``large`` for larger pieces).
+        """Yield complete lines from byte ``begin`` on, in pieces of many lines (``large`` for larger pieces).
 
         Raises FormatError after the last piece if the file was rewritten meanwhile.
         """
@@ -114,7 +114,7 @@ class Text:
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines after byte ``begin`` from the start, the end and evenly between; all of a short text."""
+        """Return lines after byte ``begin`` from the start, the end and evenly between; all lines of a short text."""
         data = self._data
         end = self._end
         count = self.some
@@ -130,7 +130,7 @@ class Text:
             last = data.rfind(b"\n", 0, max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (count - i) + last * i) // count for i in range(count))
-        # Each line is read as soon as its address is known, while that part of the file is in memory.
+        # Each line is read as soon as its offset is known, while that part of the file is in memory.
         addresses = chain(
             starts, (data.find(b"\n", position) + 1 for position in between)
         )
@@ -164,7 +164,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
             data[address : address + piece] for address in range(0, len(data), piece)
         )
         if all(map(_is_plain, pieces)):
-            return data, "latin-1"  # contains ASCII
+            return data, "latin-1"  # Latin-1 contains ASCII
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
@@ -184,7 +184,7 @@ def _is_plain(data: bytes) -> bool:
 
 
 def _detect_encoding(data: bytes) -> str:
-    """Return "ascii" or "utf-8" if the data fit it, else "latin-1", which accepts any bytes."""
+    """Return "ascii" or "utf-8" if the data match it, else "latin-1", which accepts any bytes."""
     if data.isascii():
         return "ascii"
     try:
@@ -219,7 +219,7 @@ def find_precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        if len(field) > digits:  # a field has no more digits than signs
+        if len(field) > digits:  # a field has no more digits than characters
             digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
@@ -236,7 +236,7 @@ def find_precisions(
 
 
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
-    """Return True if the last field of a file that breaks off is certainly complete, judged by the fields above it.
+    """Return True if the last field of a truncated file is certainly complete, judged by the fields above it.
 
     It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
     of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
@@ -283,12 +283,12 @@ def _count_significant_digits(field: str) -> int:
         return 0
     digits = parts[1] + parts[2]
     if not digits.lstrip("0") and parts[3]:
-        return len(digits)  # 0.00000E+00 has six
+        return len(digits)  # the number 0.00000E+00 has six significant digits
     return len(digits.lstrip("0"))
 
 
 def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the number of decimals that all fields have in common without an exponent, None if there is none."""
+    """Return the common number of decimals of all fields without exponent; None if there is none."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
     return decimals if are_alike else None

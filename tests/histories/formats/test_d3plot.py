@@ -479,8 +479,8 @@ def test_a_level_that_too_few_states_show_is_told(
     assert bool(messages) == is_told
     if messages:
         assert messages[0].startswith(
-            "38 states of the d3plot up to td = 40.5 do not show how the energy swings"
+            "38 states of the d3plot up to td = 40.5 are too few to show how the energy oscillates"
         )
         assert messages[0].endswith(
-            "name what was written more often: d3thdt, glstat, matsum, binout"
+            "name a file with more states: d3thdt, glstat, matsum, binout"
         )

@@ -206,7 +206,7 @@ def test_legs_may_be_text_and_binary() -> None:
     text, binary = make_t01(4, start=2, writer=T01TextWriter()), make_t01(4)
     run = open_contents(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
-    assert "if legs overlap the newer one is used" in run.notes[0]
+    assert "the newer restart segment is used where they overlap" in run.notes[0]
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_an_additional_history_without_global_values_is_no_leg() -> None:
         )
         assert [leg.source for leg in legs] == ["RUNT01"]
         assert (
-            "RUNT01a was left out: without global values it is no leg of the run"
+            "RUNT01a was left out: without global values it is no engine run"
             in legs[0].notes[-1]
         )
     assert radioss_th.open_legs([Source("RUNT01a", additional)], Selection())[0].parts
