@@ -41,7 +41,7 @@ def list_statements(decision: Decision) -> Lines:
     worth = decision.quality.worth
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
     if worth:
-        share = f"; its error is at most {worth.share:.2%} of the energy of the next contact"
+        share = f"; the energy of its error is at most {worth.share:.2%} of the energy of the next contact"
     else:
         share = ""
     return [
@@ -89,7 +89,7 @@ def format_accuracy(best: Candidate) -> str:
     if best.timing_tolerance is None:
         room = ""
     else:
-        room = f"any tr within ±{best.timing_tolerance:.1g} is nearly as good (error larger by at most 0.05)"
+        room = f"timing tolerance ±{best.timing_tolerance:.1g} (the error grows by at most 0.05)"
     return "; ".join(filter(None, (interval, room)))
 
 

@@ -349,6 +349,14 @@ def name_verdict(row: PartRow) -> str:
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
     best = answer.recommended
+    if best is None and answer.inventory is None:
+        return [
+            (
+                "make rigid",
+                "unknown: without the deck of the run no part can be judged",
+            ),
+            ("to improve", "give the main deck with `deck`"),
+        ]
     if best is None:
         why = next(
             (part_set.reasons[0] for part_set in answer.sets if part_set.reasons),
@@ -396,11 +404,9 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
             much = "without limit"
         else:
             much = f"{best.step_growth:.2g} times"
-        grows = f"may grow {much} while these parts are rigid"
-        cures = (
-            "set a maximum with --step-cap; --step-ratio adds its gain to the saving"
-        )
-        lines.append(("time step", f"{grows}: {cures}"))
+        grows = f"the time step may grow {much} while these parts are rigid"
+        cures = "limit it with --step-cap; to include its gain in the saving, give --step-ratio"
+        lines.append(("time step", f"{grows}; {cures}"))
     lines += [
         (name_set(part_set), reason)
         for part_set in answer.sets
