@@ -404,7 +404,7 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
             much = "without limit"
         else:
             much = f"{best.step_growth:.2g} times"
-        grows = f"the time step may grow {much} while these parts are rigid"
+        grows = f"may grow {much} while these parts are rigid"
         cures = "limit it with --step-cap; to include its gain in the saving, give --step-ratio"
         lines.append(("time step", f"{grows}; {cures}"))
     lines += [

@@ -83,7 +83,9 @@ def test_the_sentence_says_what_a_step_changes() -> None:
         exploration["recommended"]["td"],
     )
     near = run_json("explore", "--td", "0.07", *WINDOW, ENERGY)["answer"]
-    assert near.startswith("td = 0.07: residual 0.299; 0.0012 earlier (tr = 0.0135867, td = 0.0687534)")
+    assert near.startswith(
+        "td = 0.07: residual 0.299; 0.0012 earlier (tr = 0.0135867, td = 0.0687534)"
+    )
     assert "costs 2.3% of the rigid time" in near
     good = run_json("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
     assert good == "td = 0.0687534: residual 0.000. No other td in the range is better."

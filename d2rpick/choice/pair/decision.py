@@ -132,10 +132,10 @@ class Decision(NamedTuple):
             return f"use {_describe_pair(self.better)}"
         if self.objections or not self.quality.causes:
             return self.cure_of_objections
-        cures = dict.fromkeys(map(self._specify_cure, self.quality.causes))
+        cures = dict.fromkeys(map(self.specify_cure, self.quality.causes))
         return "; ".join(cures)
 
-    def _specify_cure(self, cause: Cause) -> str:
+    def specify_cure(self, cause: Cause) -> str:
         """Return the cure of a cause; the best pair of a range cannot be cured by other times in it."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
