@@ -326,17 +326,18 @@ def build_set_table(
     )
 
 
-def _format_position_error(part_set: PartSet) -> str | None:
+def _format_position_error(part_set: PartSet) -> str:
     """Return the position error of a set, and the assumption behind it."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
 
-def _format_lower_bound(part_set: PartSet, value: float | None) -> str | None:
-    """Return an error, with a sign if it is only a lower limit."""
-    if part_set.position_is_lower_bound and value is not None:
-        return f">= {value:.3g}"
-    return _format_short(value)
+def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
+    """Return an error, with a sign if it is only a lower limit; "unknown" without a value, which is not zero."""
+    if value is None:
+        return "unknown"
+    sign = ">= " if part_set.position_is_lower_bound else ""
+    return f"{sign}{value:.3g}"
 
 
 def name_verdict(row: PartRow) -> str:

@@ -99,7 +99,8 @@ def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     decision = trade_off.decide_on(best) if best else None
     if best is None or best.best is None or decision is None:
         return [("no pair to use", _explain_why_no_pair(trade_off))]
-    return list_verdict_lines(decision, best.best.tr, best.td)
+    (verdict, times), *others = list_verdict_lines(decision, best.best.tr, best.td)
+    return [(verdict, f"{times}, the best pair of the range"), *others]
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
