@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import AcceptableWindow
     from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
@@ -248,7 +249,9 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
     }
     names, numbers = fill_table(columns, trade_off.offers)
     texts = [
-        _list_texts(offer, first, f" {unit}" if unit else "")
+        _list_texts(
+            offer, trade_off.decide_on(offer), first, f" {unit}" if unit else ""
+        )
         for offer in trade_off.offers
     ]
     text_names = list(
@@ -308,10 +311,11 @@ def _name_saving(offers: Sequence[Offer]) -> str:
     return "rigid, % of the simulated time"
 
 
-def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
+def _list_texts(
+    offer: Offer, decision: Decision | None, start: Offer, unit: str
+) -> dict[str, str | None]:
     """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
     best = offer.best
-    decision = offer.decision_with_cure
     return {
         "td": format_short(offer.td),
         "tr": format_short(best.tr) if best else "none",

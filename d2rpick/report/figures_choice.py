@@ -90,6 +90,7 @@ _STRIP: Final = 0.07
 # Height of the energy axis, as a multiple of the largest energy shown.
 _HEADROOM: Final = 1.1
 # Largest number of parts whose energy is drawn.
+# Largest number of parts whose energy is drawn.
 _MOST_PARTS: Final = 6
 # First: height of the figure in a file [inch]. Second: height of one of its axes on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9

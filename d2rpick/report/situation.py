@@ -118,7 +118,7 @@ def list_health_columns(health: Health) -> tuple[str, ...]:
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
-        "practice",
+        "usual limit",
         "verdict",
     )
 

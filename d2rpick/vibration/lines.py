@@ -115,7 +115,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
         from scipy.interpolate import (
             CubicSpline,
-        )  # imported here: scipy makes the start slower
+        )  # Imported here to keep start-up fast.
 
         values = CubicSpline(time, energy)(even)
     fastest, strongest = _count_turns(even, values)

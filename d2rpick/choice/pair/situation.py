@@ -334,7 +334,8 @@ def _find_other_models(
     first = float(history.time[0])
     last = float(history.time[-1])
     # Without evidence of the next contact, nothing is known about the time after td.
-    end = flight.end or (last if is_flying or situation.evidence.span else td)
+    is_described = situation.evidence.span is not None or flight.source == "oscillator"
+    end = flight.end or (last if is_flying or is_described else td)
     start = first if flight.start is None else flight.start
     around = Span(min(td, start), end)
     is_guessed = flight.start is not None and flight.source == "energy"

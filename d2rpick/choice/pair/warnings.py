@@ -80,10 +80,11 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         advice = (
             ""
             if situation.flight.unknown_load
-            else "any tr in this interval is right; "
+            else ", so every tr in this interval is suitable"
         )
         yield Caution(
-            "at-rest", f"{text}: {advice}the earliest keeps the parts rigid for longest"
+            "at-rest",
+            f"{text}{advice}; the earliest keeps the parts rigid for longest",
         )
         return
     if situation.energy_td <= 0:
@@ -112,10 +113,13 @@ def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        text = f"the fastest vibration in the energy has {states:.2g} states per period"
+        text = f"the fastest line of the energy has {states:.2g} states per period"
+        strong = situation.evidence.states_per_strong_period
+        if strong is not None and strong > states:
+            text += f", the fastest strong line {strong:.2g}; the verdict rests on the strong lines"
         yield Caution(
             "coarse-record",
-            f"{text}; a faster one would not be seen; write the energies more often",
+            f"{text}; a faster vibration would not be seen; write the energies more often",
         )
     if vibration.estimated:
         yield Caution(
