@@ -87,11 +87,13 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         )
         return
     if situation.energy_td <= 0:
-        text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
-        yield Caution(
-            "no-energy",
-            f"{text}; it must be above 0 to be matched at tr; choose another td",
-        )
+        if not situation.history.energy.any():
+            text = "the energy is 0 in all states; it must be above 0"
+            cure = "choose the column with the internal energy, as `energy`"
+        else:
+            text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}; it must be above 0"
+            cure = "choose another td"
+        yield Caution("no-energy", f"{text} to be matched at tr; {cure}")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g},"
         yield Caution("poor-td", f"{lost} and no tr can keep it; choose another td")
