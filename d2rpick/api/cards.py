@@ -82,6 +82,15 @@ def list_solvers() -> Sequence[str]:
     return tuple(SOLVERS)
 
 
+def explain_unknown_solver(name: str) -> str:
+    """Return the message for a name that is no solver, with the most similar name of one."""
+    from d2rpick.histories.names import suggest_name
+
+    solvers = list_solvers()
+    near = suggest_name(name, solvers)
+    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
+
+
 @dataclass(eq=False, repr=False)
 class Cards:
     """Options of a card, shared by all commands that print one."""

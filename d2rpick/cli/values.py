@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
-from d2rpick.api.cards import SETTINGS, Cards, list_solvers
+from d2rpick.api.cards import (
+    SETTINGS,
+    Cards,
+    explain_unknown_solver,
+    list_solvers,
+)
 from d2rpick.api.request import JUDGING, write_option
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.options import UNLIMITED, list_options
@@ -212,14 +217,7 @@ class SolverName(CompletedText):
     ) -> str:
         """Return the name, or fail with the allowed names."""
         if value not in list_solvers():
-            from d2rpick.histories.names import suggest_name
-
-            near = suggest_name(value, list_solvers())
-            self.fail(
-                f"{value!r} was found{near}, one of {', '.join(list_solvers())} was expected",
-                param,
-                ctx,
-            )
+            self.fail(explain_unknown_solver(value), param, ctx)
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
