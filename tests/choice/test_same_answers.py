@@ -237,9 +237,9 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         "one mode", 0.8, {},
         FrozenAnswer(
             basis="oscillator",
-            recommended=RoundedPair(tr=0.0941268, td=0.8, residual=0.708),
+            recommended=RoundedPair(tr=0.0941268, td=0.8, residual=0.705),
             tr_half_width=0.00013,
-            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.072),
+            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.0),
             candidates=13,
             admissible=6,
             next_tr=(0.168248, 0.329018, 0.398432),
@@ -250,9 +250,9 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         "one mode", (0.5, 0.9), {},
         FrozenAnswer(
             basis="oscillator",
-            recommended=RoundedPair(tr=0.104731, td=0.828681, residual=0.072),
+            recommended=RoundedPair(tr=0.104731, td=0.828681, residual=0.0),
             tr_half_width=0.00013,
-            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.072),
+            better_pair=RoundedPair(tr=0.104731, td=0.828681, residual=0.0),
             candidates=14,
             admissible=7,
             next_tr=(0.157443, 0.34176, 0.385479),
