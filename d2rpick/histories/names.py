@@ -114,6 +114,28 @@ def find_unit(name: str) -> str:
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
 
 
+def find_energy_unit(name: str) -> str:
+    """Return the unit at the end of the name of an energy; empty if it has none, or one that is no energy.
+
+    Examples
+    --------
+    >>> [find_energy_unit(name) for name in ("Internal energy [mJ]", "IE_kJ", "energy_s", "ratio (-)")]
+    ['mJ', 'kJ', '', '']
+    """
+    return check_energy_unit(find_unit(name))
+
+
+def check_energy_unit(unit: str) -> str:
+    """Return a unit as it is written, or an empty text if it is no unit of energy.
+
+    Examples
+    --------
+    >>> check_energy_unit("N*mm"), check_energy_unit("ms")
+    ('N*mm', '')
+    """
+    return unit if unit.casefold().replace(" ", "*") in _ENERGY_UNITS else ""
+
+
 def remove_unit(name: str) -> str:
     """Return a name without its unit and the word before it; a bracket without a unit stays.
 

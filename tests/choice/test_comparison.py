@@ -192,7 +192,10 @@ def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(
     arguments = ("verify", "--part", "box", names[0], "--switched", names[1])
     refusal = run(*arguments).stderr
     assert "the energy stays constant from 0 to" in refusal
-    assert "but that of the reference run does too; give --tr and --td" in refusal
+    assert (
+        "but that of the reference run does too; give the run with the switching cards, or --tr and --td"
+        in refusal
+    )
     assert run_json(*arguments, "--tr", "0", "--td", "0.13")["verified"] is True
 
 

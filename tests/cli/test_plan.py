@@ -117,8 +117,8 @@ def test_a_poor_window_is_called_poor() -> None:
         assert alone["quality"] == row["quality"]
     text = plan.text("table", DisplayOptions())
     assert (
-        f"flight {rows[1]['flight']}   do not use: it is unknown whether the parts are deformed in the same direction at tr and td"
-        in text
+        f"flight {rows[1]['flight']}   do not use: it is unknown whether the parts are deformed "
+        "in the same direction at tr and td" in text
     )
     sentence = " ".join(text.partition("\nnext")[0].split())
     assert f"(do not use flight {rows[1]['flight']})" in sentence

@@ -290,7 +290,7 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
         candidate for candidate in suggestion["candidates"] if candidate["recommended"]
     )
     assert best["position_error_assumes"] == ONE_BODY
-    result = run("suggest", "-q", *arguments).stdout
+    result = join_wrapped_lines(run("suggest", "-q", *arguments).stdout)
     assert (
         "at td if the parts become one rigid body: engine is frozen at another place"
         in result
