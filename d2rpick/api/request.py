@@ -79,7 +79,7 @@ class ReadingOptions:
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
-        "Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
+        "Energy history of the reference run to judge by: file, folder or glob; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = make_option(
