@@ -167,3 +167,11 @@ def test_a_folder_without_a_run_is_named_by_follow(tmp_path: Path) -> None:
     folder = tmp_path / "nofolder"
     answer = run("follow", "--once", str(folder))
     assert f"{folder}: no file of a run yet; check the name" in answer.stdout
+
+
+@pytest.mark.parametrize("td", ["0.05", "0.39"])
+def test_a_td_outside_the_flight_is_warned_about_once(td: str) -> None:
+    answer = run("suggest", "--td", td, "--part", "box", MATSUM)
+    warnings = [line for line in answer.stderr.splitlines() if "warning: " in line]
+    assert len([line for line in warnings if f"td = {td}" in line]) == 1
+    assert "the nearest flight is 0.086 to 0.379; td must lie in it" in answer.stderr

@@ -155,13 +155,13 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    elif td <= earliest:
+    elif td <= earliest and not flight.refusal:  # the refusal says it already
         yield Caution(
             "td-in-load",
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
     yield from _warn_about_grazing(situation)
-    if td > situation.latest_td:
+    if td > situation.latest_td and not flight.refusal:
         yield Caution(
             "td-after-contact",
             f"td = {td:.6g} lies after {describe_end_of_flight(situation)}",
