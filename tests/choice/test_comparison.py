@@ -137,7 +137,8 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     )
     assert (verified_at["tr"], verified_at["td"]) == (verdict["tr"], 0.37)
     assert (
-        "both runs have the same energies, so it may be the reference run again; give the run with the switching cards, or --tr and --td"
+        "both runs have the same energies, so it may be the reference run again; "
+        "give the run with the switching cards, or --tr and --td"
         in read_refusal("verify", "--part", "box", "--switched", BOX, BOX)
     )
     assert (
