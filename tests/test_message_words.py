@@ -32,15 +32,16 @@ def list_texts(tree: ast.AST) -> Iterator[str]:
     docstrings = {id(statement.value) for statement in statements}
     formatted = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
     pieces = {id(piece) for node in formatted for piece in node.values}
-    for node in formatted:
+    for joined in formatted:
         yield "".join(
             str(piece.value) if isinstance(piece, ast.Constant) else "..."
-            for piece in node.values
+            for piece in joined.values
         )
     for node in ast.walk(tree):
-        is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
-        if is_text and id(node) not in docstrings | pieces:
-            yield str(node.value)
+        if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
+            continue
+        if id(node) not in docstrings | pieces:
+            yield node.value
 
 
 def find_other_names(text: str) -> list[str]:
