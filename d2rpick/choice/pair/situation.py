@@ -315,7 +315,8 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
         else:
             count = f"{history.time.size} states were"
         raise RangeError(
-            f"{', '.join(history.source)}: {count} found, choosing needs at least 3"
+            f"{', '.join(history.source)}: {count} found, at least 3 were expected; "
+            "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")
     if settings.after is not None:
