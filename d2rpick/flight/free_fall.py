@@ -36,8 +36,8 @@ _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 _REACH_OF_DIGITS = 10.0
 # Tolerances for recognising gravity while a load fades: 5 % in size, direction cosine 0.999 with an axis.
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# Damping that takes more than the first share of the momentum in a window is accepted
-# only if the second share of the largest momentum remains.
+# If damping takes more than the first share of the momentum in a window,
+# at least the second share of the largest momentum must remain.
 _DAMPED, _LEFT = 0.2, 0.05
 # Largest share of the momentum that damping takes between two states.
 _SHOWN = 0.1

@@ -73,7 +73,7 @@ _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 # Times per period of the fastest relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# The energy is linear between times that are this many times finer.
+# Between these times, each interval is divided into this many parts in which the energy is treated as linear.
 _FINER: Final = 4
 
 # Largest misfit (first) and prediction error (second) of modes that show a flight, relative to the energy range.

@@ -51,7 +51,7 @@ SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 # Residual of a release without any vibration: a switch with a larger residual preserves nothing [-].
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the flight before td saves little, and its deformation is similar only because it is near.
+# A tr in this last share of the time before td saves little, and its deformation is similar only because it is near.
 NEAR_TD: Final = 0.25
 # Largest number of parts that a warning names for one reason. The JSON output names all parts.
 _NAMED = 5
@@ -265,7 +265,7 @@ class Vibration:
             return ()
         from d2rpick.vibration.part_signs import (
             list_contributions,
-        )  # imported here, because tables have no parts
+        )  # Imported here to keep start-up fast.
 
         return list_contributions(self.signed, tr, self.td)
 

@@ -1,9 +1,9 @@
 """Plan the rigid windows of a run: the times for each flight, and which windows this reference run supports.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
-moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
-reference run supports all windows up to the first that locks in energy, including it.  Later windows are planned from
-the run switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
+moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
+run supports all windows up to and including the first that locks in energy.  Later windows are planned from the
+run that is switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
 
 Each window that locks in energy requires another run, so a short window is left out in favour of a longer later one.
 """

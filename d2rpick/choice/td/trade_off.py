@@ -305,7 +305,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest offer with half the error, or the recommended one if better, or None.
+    """Return the nearest offer with half the error, else the recommended offer if it is better, else None.
 
     Like ``suggest``, it looks at the energy peaks first; without one it takes a Pareto-optimal offer.
     """
