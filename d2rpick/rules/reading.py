@@ -154,7 +154,7 @@ def _check_fields(case: Case) -> Iterator[Objection]:
 
 
 def _find_unreadable_members(case: Case) -> Iterator[Problem]:
-    """Yield the unreadable fields of all part sets that the switching cards use, directly or through other sets."""
+    """Yield the unreadable fields of all part sets that the switching cards name, directly or through other sets."""
     used = dict.fromkeys(
         line.part.value for card in case.sets for line in card.switched if line.by_set
     )
@@ -459,7 +459,8 @@ def _describe_trigger(card: SwitchSet) -> str:
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
     if card.kind == "plain" and not card.switched and not card.count_problem:
-        return ""  # the card only permits switches in a restart
+        # this card switches nothing itself: it only permits switches in a restart
+        return ""
     if card.kind == "plain":
         return "acts at the start of the run"
     if (
