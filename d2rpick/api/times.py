@@ -27,7 +27,7 @@ def is_time_with_unit(text: str) -> bool:
 def find_time_unit(
     names: Sequence[str], selection: Selection, input_format: str
 ) -> str:
-    """Return the unit of time that the files of a run name; empty if they name none, or different ones.
+    """Return the time unit that the files of a run name; empty if they name no unit, or different units.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def find_time_unit(
 
 
 def convert_typed_time(text: str, unit: str, source: str) -> float:
-    """Return a time with its unit as a number in the ``unit`` of a run; error if ``source`` names no unit.
+    """Return a typed time as a number in the ``unit`` of the run; raise an error if ``source`` names no unit.
 
     Raises
     ------
