@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# A restart steps back once; if more than this share of the states steps back, the column is not a time.
+# Share of the states that may step back in time. A restart steps back only once; another column steps back often.
 _MOST_BACK: Final = 0.1
-# Significant digits by bytes per number: 24 bits give 7 digits; 17 digits restore every double.
+# Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
 # Output has a gap if an interval is this many times the median interval.
@@ -43,10 +43,11 @@ _PIECE: Final = 1 << 15
 # Databases may belong to one run if this share of the states of the coarser one is at times of the other one.
 # Output intervals may differ, but a solver writes at its own cycles.
 _FEWEST = 0.5
-# Databases of a run end within this many of their longest output intervals, as a killed run lacks some states.
+# End times of databases of one run may differ by this number of output intervals: a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy.
-# The second value is round-off relative to the kinetic energy. In solver files the excess is below 0.1 %.
+# Tolerances for an internal energy of the parts above the energy of the model.
+# The first is relative to the largest energy; in solver files the excess is below 0.1 %.
+# The second is the round-off relative to the kinetic energy.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
@@ -147,7 +148,7 @@ class Database:
 
 
 class Legs:
-    """The legs of one run as one `Database`, by their start; in overlaps the newer leg is used.
+    """The legs of one run, in the order of their start, as one `Database`; in overlaps the newer leg is used.
 
     A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
     are used only if all legs have none.
@@ -160,11 +161,11 @@ class Legs:
         named: Sequence[tuple[str, str]] = (),
         notes: Sequence[str] = (),
     ) -> None:
-        self._cut = cut  # files with truncated packed data
-        self._own_notes = notes  # notes on files that are not read
+        self._cut = cut  # names of packed files that are truncated
+        self._own_notes = notes  # notes on files that were not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # the times of a single leg may be unknown yet
+        if len(legs) > 1:  # the times of a single leg may not be known yet
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
@@ -211,7 +212,7 @@ class Legs:
             elif len(names) == 1:
                 channels[quantity] = names[0]
         for quantity, name in self._named:
-            # another database of the run may have it; otherwise `open_run` raises
+            # another database of the run may have the quantity; if none has it, `open_run` raises the error
             with suppress(FormatError):
                 channels[quantity] = self.find(name)
         return channels
@@ -226,7 +227,7 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and on what was left out between them."""
-        # first, since reading the columns may add notes to the legs
+        # read first, because reading the columns may add notes to the legs
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -251,12 +252,12 @@ class Legs:
 
     @cached_property
     def time(self) -> Samples:
-        """Times of the whole model, increasing."""
+        """Times of the states of the whole model, in increasing order [time]."""
         return self._joined([leg.time for leg in self._legs], self._kept[0])
 
     @cached_property
     def part_time(self) -> Samples:
-        """Times of the parts, increasing."""
+        """Times of the states of the parts, in increasing order [time]."""
         return self._joined([leg.part_time for leg in self._legs], self._parts_kept[0])
 
     def find(self, wanted: str) -> str:
@@ -285,7 +286,7 @@ class Legs:
         return values
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the coarsest leg."""
+        """Return the precisions of the leg with the coarsest numbers."""
         precisions = [leg.precisions(names) for leg in self._legs]
         coarsest_time = min((time for time, _ in precisions), key=_count_digits)
         coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
@@ -381,7 +382,7 @@ def _count_digits(precision: Precision) -> int:
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, in which a leg may be missing."""
+    """Return notes on long intervals without output, where a leg may be missing."""
     if time.size < 4:
         return ()
     pieces = (
