@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that can be read: they add no integers in the columns of element and part id.
+# Options of element keywords that can be read, because they add no integers in the columns of the ids.
 _OPTIONS: Final = {
     *(
         "THICKNESS",
@@ -75,7 +75,7 @@ _OPTIONS: Final = {
 }
 # Keywords without elements: they change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
-_TEN: Final = 10  # nodes in the second line of a solid element
+_TEN: Final = 10  # number of nodes in the second line of a solid element
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = (
     "MAT_DAMPER",
@@ -209,7 +209,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
 def find_shared_nodes(
     cards: Sequence[Card], bodies: Mapping[int, int]
 ) -> dict[tuple[int, int], int]:
-    """Find a node for every two parts of different bodies that share one.
+    """Find a shared node for each two parts that belong to different bodies and share nodes.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
         kind = card.name.split("_")[1:2]
         fitting = card.name.startswith(
             "ELEMENT_SEATBELT_"
-        )  # slip ring, retractor, sensor and so on
+        )  # seat-belt keywords without elements: slip ring, retractor, sensor and so on
         if (
             card.name.startswith("ELEMENT_")
             and kind
@@ -375,7 +375,7 @@ def _read_elements(
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
             )
-        # Rows with an element, a part and enough nodes; others belong to options.
+        # Rows with an element, a part and enough nodes are elements; other rows belong to options.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
@@ -427,7 +427,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 
 
 def _read_codes(lines: Lines, fields: Layout) -> Integers:
-    """Return the last of the fields as integers; mostly 0, which needs no parsing."""
+    """Return the last field of each line as integers. Most of them are 0 and need no parsing."""
     start, width = fields[-1]
     if (
         lines.in_columns
@@ -487,7 +487,7 @@ def _build_section(
 
 
 def _read_materials(deck: Deck, parts: DeckParts) -> Iterator[tuple[str, Material]]:
-    """Yield id and material of each *MAT card."""
+    """Yield the id and the material of each *MAT card."""
     for card in deck.named("MAT"):
         if not card.data or card.name.startswith("MAT_ADD"):
             continue

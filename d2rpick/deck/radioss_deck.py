@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # most digits of an id
+_DIGITS = 10  # largest number of digits of an id
 
 # Elements whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {
@@ -76,7 +76,7 @@ def read_blocks(source: SourceFile) -> Iterator[Block]:
 
 
 def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
-    """Yield offset and text of the lines that begin with ``/`` or ``#include``.
+    """Yield the offset and text of the lines that begin with ``/`` or ``#include``.
 
     Lines of a mesh are not looked at one by one.
     """
@@ -151,7 +151,7 @@ class RadiossLeg:
     name: str
     number: int
     stop: Value[float]
-    # Each card with True if it makes bodies rigid, and its main nodes.
+    # For each card: True if it makes bodies rigid, and its main nodes.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
     )
@@ -160,11 +160,11 @@ class RadiossLeg:
     starts: list[InitialVelocity] = field(default_factory=list)
     # Sensors that are reset at the start of the leg.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # sensor that ends the leg at an unknown time
+    sensor: int = 0  # id of a sensor that ends the leg at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
-    """Read the legs of a file: one, or several for printed cards in one text."""
+    """Read the legs in a file: one, or several if the text contains several printed engine files."""
     legs: list[RadiossLeg] = []
     waiting: list[Card] = []
     for card in map(make_card, read_blocks(source)):
@@ -301,7 +301,7 @@ class Starter:
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Return the rigid bodies, each with all bodies that are merged into it.
+        """Return the rigid bodies; each includes all bodies that are merged into it.
 
         A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
@@ -415,7 +415,8 @@ class Starter:
     @property
     def moved(self) -> bool:
         """Return True if a submodel may offset ids."""
-        return bool(self.named(""))  # //SUBMODEL has no word between its slashes
+        # the keyword //SUBMODEL has no word between its two slashes
+        return bool(self.named(""))
 
     @property
     def transformed(self) -> bool:
@@ -424,13 +425,14 @@ class Starter:
 
     @property
     def unturned(self) -> dict[int, str]:
-        """Return the kind of elements of solids whose stresses do not rotate with a rigid body, by part."""
+        """Return, by part, the element kind of solids whose stresses do not rotate with a rigid body."""
         defaults = [
             _read_isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        isolid, iframe = defaults[0] if defaults else (0, 0)  # the first card is used
+        # if several cards define it, the first card is used
+        isolid, iframe = defaults[0] if defaults else (0, 0)
         solids = (
             card
             for card in self.named("PROP")
@@ -525,5 +527,5 @@ def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
 
 
 def read_reals(row: Row, columns: Iterable[CardColumn]) -> list[float]:
-    """Read the numbers in columns of a line; 0 for a blank, NaN for text that is not a number."""
+    """Read the numbers in the columns of a line: a blank gives 0, text that is not a number gives NaN."""
     return [parse_real(column.cut(row.text)) for column in columns]

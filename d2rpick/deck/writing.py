@@ -133,7 +133,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         )
     for block, sign in find_cuts(
         deck
-    ):  # the added lines would hide the truncation, and complete a truncated number
+    ):  # the added lines would hide that the file is truncated, and could complete a truncated number
         if block.source is deck.sources[0]:
             raise DeckError(
                 f"{deck.path}: {sign} The added cards would hide this: {describe_cure(block)}"
@@ -178,7 +178,7 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
 
 
 def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
-    """Insert cards into the bytes of a main file, before its end mark or at its end; ``file_blocks`` are its blocks."""
+    """Insert cards into the bytes of a main file, before ``*END`` or at its end; ``file_blocks`` are its blocks."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
     *_, last = file_blocks
@@ -190,7 +190,7 @@ def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
-    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
+    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
         if not relative.startswith(os.pardir):
@@ -223,7 +223,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     leg = run.legs[0]
     _refuse_unlike(run.legs)
     starter = run.starter.sources[0].name
-    # The engine looks for a restart file whose name begins like its own.
+    # The engine looks for a restart file whose name begins with the run name of the engine file.
     root = find_root(starter) or leg.name
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
@@ -254,7 +254,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
             for node in find_bodies_kept_off(run.legs)
             if node not in switched_nodes
         ]  # without these lines the bodies would be rigid from time 0
-        # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
+        # The text of a leg without time-step limit ends with an /RBODY/OFF; these lines are appended to that card.
         lines = (
             write_numbers(off_nodes)
             if printed_leg.cap is None
@@ -413,7 +413,7 @@ def read_block(block: Block) -> bytes:
     return content if content.endswith(b"\n") else content + b"\n"
 
 
-# Legs that are chosen while the run is computed.
+# Legs of a driven run, which are chosen while the run is computed.
 
 
 class DrivenDeck(NamedTuple):
@@ -474,7 +474,7 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import find_bodies  # imported here: it loads numpy
+    from d2rpick.deck.radioss_bodies import find_bodies  # imported here to start faster
 
     run = read_run(path)
     if run.starter is None or not run.legs:
@@ -543,7 +543,7 @@ def _read_interval(leg: RadiossLeg) -> float:
 
 
 def _find_second(run: RadiossRun) -> float | None:
-    """Return the length of a second in the time unit of the deck [time]; None if it names none."""
+    """Return the length of a second in the time unit of the deck [time]; None if the deck names no unit."""
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())
     if len(rows) > 3:
