@@ -324,7 +324,7 @@ class Legs:
     def _order(
         self, times: Sequence[Samples]
     ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        """Return which states are valid, and notes on the others."""
+        """Return which states are valid, and notes on the invalid states."""
         for leg, time in zip(self._legs, times, strict=True):
             back = int(np.count_nonzero(time[1:] < time[:-1]))
             steps = time.size - 1

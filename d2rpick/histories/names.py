@@ -1,4 +1,4 @@
-"""Interpret the names of columns, units and parts, and which of them the user selects."""
+"""Interpret the names of columns, units and parts, and find those that the user selects."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ INTERNAL_ENERGY: Final = frozenset(
 )  # fmt: skip
 
 # Names of other quantities of the whole model: energies, momentum, velocity and mass of the moving parts.
-# They come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
+# The names come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
 # The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
@@ -112,7 +112,7 @@ def find_unit(name: str) -> str:
 
 
 def remove_unit(name: str) -> str:
-    """Return a name without its unit and the word before it; a bracket without a unit stays.
+    """Return a name without its unit and without the word before the unit. A bracket that contains no unit stays.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def match_names(wanted: str, names: Sequence[str]) -> list[int]:
 
 
 def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
-    """Return the one name that is `meant`; raise FormatError, with similar names, if there is none or several.
+    """Return the only matching name; raise FormatError, with similar names, if none or several match.
 
     Examples
     --------
@@ -192,7 +192,7 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity."""
+    """Return a question with the most similar name, or an empty text. ``likeness`` (0 to 1) is the least similarity."""
     import difflib
 
     folded = {name.casefold(): name for name in names}

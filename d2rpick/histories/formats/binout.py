@@ -39,7 +39,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
     """Open the files of each folder as one leg, because a solver continues and distributes a binout in one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
-        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  start-up
+        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  starts faster
         folders.setdefault(folder, []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
 
