@@ -429,6 +429,21 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
     assert flight.described
 
 
+@pytest.mark.parametrize("rate", [1.0, 0.96, 1.05])
+def test_a_body_that_loses_energy_at_another_rate_than_its_vibration_is_under_a_load(
+    rate: float,
+) -> None:
+    """Drag takes about as much as damping by mass would: 6 % of the speed, and 4 or 5 % of that less or more."""
+    alpha = 0.06
+    body, ringing = 60 * np.exp(-2 * rate * alpha * TIME), 20 * np.exp(-alpha * TIME)
+    kinetic = body + ringing * np.cos(60 * TIME) ** 2
+    lost = 2 * alpha * integrate_by_trapezia(TIME, rate * body + kinetic - body)
+    record = make_energy_table(80 - lost - kinetic, kinetic)
+    flight = suggest_in_history(record, 0.8, Settings()).situation.flight
+    assert flight.certain is (rate == 1.0)
+    assert flight.unknown_load is (rate != 1.0)
+
+
 @pytest.mark.parametrize("lost", [0.0, 0.02, 0.3])
 def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
     lost: float,

@@ -43,7 +43,10 @@ def test_a_run_that_has_not_begun_says_so(folder: Path) -> None:
             "no file of a run yet; check the name if the run has begun",
         )
     (folder / "runT01").write_bytes(b"")
-    assert watch_to_end(folder)[-1].message == "no file of a run yet; check the name if the run has begun"
+    assert (
+        watch_to_end(folder)[-1].message
+        == "no file of a run yet; check the name if the run has begun"
+    )
     (folder / "runT01").write_bytes(LEGS[0][:200])
     assert watch_to_end(folder)[-1].message.startswith("cannot be read yet")
 
