@@ -34,15 +34,15 @@ _BOUNDS: Final = {
 }
 # Unpacked size from which the ratio is checked: constant columns shrink by a factor of 1000, and less is unpacked fast.
 _ALLOWED: Final = 1 << 24
-_TRIES: Final = 5  # attempts to read a file that keeps changing
+_TRIES: Final = 5  # number of attempts to read a file that keeps changing
 _TICK: Final = (
-    50_000_000  # [ns] resolution of most file times: later changes are visible
+    50_000_000  # resolution of most file times [ns]; later changes are visible
 )
-# [ns] the same for file systems that store full seconds
+# resolution of file times on file systems that store full seconds [ns]
 _COARSE: Final = 2_000_000_000
-# [ns] needed to write a byte: the times of a file are set when its last write begins
+# time to write a byte [ns]; it matters because the file time is set when the last write begins
 _SLOWEST: Final = 5
-# [s] pause for a write in progress, during which the file is incomplete
+# pause for a write in progress, during which the file is incomplete [s]
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
@@ -134,7 +134,7 @@ class FileState(NamedTuple):
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
         now = time.time_ns()
-        # The modification time can be set, even to the future; such a time is ignored.
+        # The modification time can be set to any value; a time in the future is ignored.
         latest = max(
             status.st_ctime_ns, status.st_mtime_ns if status.st_mtime_ns <= now else 0
         )
@@ -278,7 +278,8 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
     except FileNotFoundError:
         mask = os.umask(0)
         os.umask(mask)
-        scratch.chmod(0o666 & ~mask)  # mkstemp gives access to the owner only
+        # mkstemp creates files that only the owner can access
+        scratch.chmod(0o666 & ~mask)
         return
     if hasattr(os, "chown"):
         with suppress(PermissionError):

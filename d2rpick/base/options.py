@@ -15,7 +15,7 @@ from d2rpick.base.tuples import NamedTuple
 
 # Stands for the end of a range of whole numbers that has no upper limit.
 UNLIMITED: Final = 2**63
-# Ranges of numbers: any, above 0, from 0 on, from 0 to 1, from 1 on.
+# Ranges of numbers: any number, above 0, from 0 up, from 0 to 1, from 1 up.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)

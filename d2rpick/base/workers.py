@@ -183,7 +183,7 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """End this process when the other end of ``held`` is closed; an interrupt ends it without a message."""
-    # True in a spawned process; in a forked process `interruptible` has already changed the handler
+    # this is the case in a spawned process; in a forked process `interruptible` has already changed the handler
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
@@ -216,7 +216,7 @@ def _start_server(module: str) -> None:
     )  # Windows has no fork server
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # starting it would unblock SIGINT
+    resource_tracker.ensure_running()  # starting the server would unblock SIGINT
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
@@ -261,7 +261,7 @@ class Cluster(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls, with up to ``room`` calls at the scheduler.
+        """Yield the results of all calls; the scheduler gets at most ``room`` calls at a time.
 
         The scheduler repeats the calls of dead workers.  Calls are submitted in groups of at least half of ``room``,
         since each message costs as much as a call.
