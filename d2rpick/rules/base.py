@@ -218,7 +218,7 @@ class Case:
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
-        """Return the events that make a known part rigid."""
+        """Return the switches that make a known part rigid."""
         return tuple(
             event
             for event in self.windows.events
@@ -385,7 +385,7 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end of the last leg as written."""
+        """Return the end time of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property

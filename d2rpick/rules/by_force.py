@@ -251,5 +251,5 @@ def _find_pair(
 
 
 def _find_event(unit: Unit, events: Sequence[SwitchEvent]) -> SwitchEvent | None:
-    """Return the event of a unit, or None."""
+    """Return the event that switches a unit, or None."""
     return next((event for event in events if event.unit == unit), None)

@@ -207,7 +207,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Find when the force of a contact, interface or rigid wall acts [time]; None if it is not written.
+        """Find when the force of a contact, interface or rigid wall acts [time]; None if no file contains the force.
 
         ``least``: only a force above it counts [force].
         """
