@@ -471,7 +471,7 @@ def _read_journal(text: str) -> list[tuple[float, float]]:
     """Return the windows of the rigid restart segments in a journal; the last segment with a number is used."""
     import json  # imported here to start faster
 
-    # for each segment: its number, True if rigid, start, end
+    # each segment as its number, True if it is rigid, its start and its end
     legs: list[tuple[int, bool, float, float]] = []
     for line in text.splitlines():
         try:

@@ -52,7 +52,7 @@ class RunQuestion(NamedTuple):
 
     @property
     def deck(self) -> str | None:
-        """The main deck of the run; None without a deck, or if it is the deck of another model."""
+        """The main deck of the run; None if there is no deck, or if the deck belongs to another model."""
         return self.request.deck if self.of_this_run else None
 
     @property
@@ -115,7 +115,7 @@ def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
 def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> RunQuestion:
-    """Select the requested energy of a run, with the data of its deck.
+    """Select the requested energy of a run, and add the data of its deck.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or the weights alone; return None without either.
+    """Read the deck with its weights, or only the weights; return None if neither is given.
 
     Raises
     ------

@@ -262,7 +262,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` judge by the same history."""
+        """Return the options with which ``card`` and ``check`` use the same history as judge."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]

@@ -1,4 +1,4 @@
-"""Provide a run for scripts: read from files or from memory, or taken from a table."""
+"""Provide runs for scripts: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 

@@ -345,7 +345,7 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Return the number of ``runs`` runs taken from the file, and why other rows were not used."""
+        """Return a text: how many of ``runs`` runs are taken from the file, and why other rows were not used."""
         if self.outdated:
             outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:
