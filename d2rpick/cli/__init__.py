@@ -146,7 +146,7 @@ class _CommandGroup(Documented, click.Group):
             ctx.exit(COULD_NOT_RUN)
         ctx.meta["d2rpick.command"] = tuple(
             args
-        )  # a copy, because click empties the list of arguments
+        )  # a copy is kept, because click empties the list of arguments
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -179,7 +179,7 @@ class _CommandGroup(Documented, click.Group):
             stop_with_error(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             stop_with_error(error.format_message())
-        except OSError as error:  # raised if a help or version text cannot be written
+        except OSError as error:  # the help or the version cannot be written
             stop_with_error(format_in_one_line(error))
         except click.Abort:  # click converts an interrupt to this
             _tell_error("interrupted")
@@ -234,7 +234,8 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        lines = examples.replace("\\\n    ", "").split("\n")  # each command on one line
+        # each command of the examples on one line
+        lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(
             function.__name__, cls=cls, help=help_text, epilog=epilog, **settings

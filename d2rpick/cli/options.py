@@ -63,7 +63,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": ADVANCED,
 }
-# Placeholders of options that are times of the run.
+# Placeholders in the help for options that are times of the run.
 _TIMES: Final = ("T", "LO HI")
 # Options that write files, which would already exist if the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")

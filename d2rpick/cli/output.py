@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# narrower terminals are ignored [columns]
+# smallest width of a terminal that is used [columns]
 _NARROWEST: Final = 40
-# formats implied by file names
+# formats that the suffixes of file names imply
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # file types that users may expect for a report, but that are not supported
 _PRINTED: Final = (".pdf", ".doc", ".docx")
@@ -207,12 +207,12 @@ class Output:
             self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
-        """Exit with 1 if the answer is an objection, unless ``--exit-zero`` is given."""
+        """Exit with code 1 if the answer is an objection, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(self, decision: Verdict | None, min_quality: str) -> None:
-        """Exit with 1 if there is no pair, or if its grade is below ``min_quality``; a message names the limit."""
+        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``; a message names the limit."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return

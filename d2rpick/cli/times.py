@@ -24,7 +24,7 @@ _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
 class TimeType(NumberType):
-    """A time of the run: a number, or a text like 64ms, which `convert_typed_times` replaces by a number."""
+    """A time of the run: a number, or a text such as 64ms that `convert_typed_times` replaces with a number."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -39,7 +39,7 @@ class TimeType(NumberType):
 
 
 def convert_typed_times(ctx: click.Context) -> None:
-    """Replace the times of a command that were typed with a unit by numbers in the unit of the run.
+    """Convert the times of a command that were typed with a unit to numbers in the unit of the run.
 
     Raises
     ------
