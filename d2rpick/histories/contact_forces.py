@@ -115,6 +115,6 @@ def join_contact_forces(
 
 
 def _is_above_round_off(values: Samples) -> NDArray[np.bool_]:
-    """Return an array that is True for states whose values (n, k) exceed round-off of the largest value."""
+    """Return an array that is True for states with values (n, k) above the round-off of the largest value."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

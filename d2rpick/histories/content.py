@@ -346,7 +346,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
 
 
 def open_content(name: str) -> bytes | OnDisk:
-    """Return the content of a file, as bytes if it is small or not a regular file.
+    """Return the content of a file. A small file, or one that is not a regular file, is returned as bytes.
 
     Raises
     ------

@@ -377,7 +377,7 @@ def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the digits or decimals of a precision."""
+    """Return the number of decimals of a precision, or else its number of digits."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
@@ -392,7 +392,8 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    if max(longest) <= _LONG * min(shortest):  # the usual case: regular output
+    # the usual case, regular output intervals
+    if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
@@ -436,7 +437,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases with few common printed times, or with different ends."""
+    """Yield a note on each pair of databases that have few printed times in common, or different end times."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue

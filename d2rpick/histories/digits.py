@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 _DIGITS: Final = 6  # significant digits of a printed time
-# Significant digits of a sum of times: more than in files, fewer than in a double.
+# Number of significant digits of a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 
 # Units of time by their names in files and options [s], as texts, because 0.001 is not exact as a double.
@@ -35,7 +35,7 @@ _TYPED_TIME: Final = (
 _NEVER_MEANT: Final = 0.01
 # If a smaller unit gives a time in this first share, the record more likely ends before the time.
 _HARDLY_MEANT: Final = 0.05
-# A td with fewer states before it is assumed to be in another unit, since it hardly saves time.
+# A td with fewer states before it is assumed to be in another unit, because such a td hardly saves time.
 # A value within the record in both units needs at least 1000 states, unless it lies before the second state.
 _FIRST_STATES: Final = 10
 
@@ -185,7 +185,7 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return a question whether an argument outside a ``record`` (n,) was given in a smaller unit.
+    """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit.
 
     It is empty if that does not explain the value.
 
@@ -211,7 +211,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return a question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s.
+    """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s.
 
     It is empty if that does not explain the value.
     """
@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return a question whether an argument was meant in a unit, with the values to give instead."""
+    """Return the question whether an argument was meant in a unit, with the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

@@ -66,7 +66,7 @@ _DYNA_DATABASES: Final = (
     ),
 )
 _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# A keyword at the start of a line, of LS-DYNA or of a starter or engine file of Radioss.
+# Pattern of a keyword at the start of a line, in an LS-DYNA deck or a Radioss starter or engine file.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 

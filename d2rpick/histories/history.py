@@ -145,7 +145,7 @@ class Momenta:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the parts whose momentum components are not all one constant number."""
+        """Indices of the parts that move: their momentum components are not all the same constant number."""
         lowest, highest = self._bounds
         return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
 

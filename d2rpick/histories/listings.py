@@ -33,7 +33,7 @@ _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 _FIXED: Final = (2026, 1, 13)  # date of the fix of the energy of switched elements
-# Commits of the last weeks before the fix, which may have been built in the year of the fix.
+# Commits of the last weeks before the fix. An engine built from them may show the year of the fix.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
@@ -241,13 +241,13 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
 def find_printed_steps(
     run: OpenedRun, *neighbours: str
 ) -> dict[int, tuple[float, str]]:
-    """Return the smallest time step of each part, and the name of the file that contains it.
+    """Return the smallest time step of each part, and the name of its source.
 
     Parameters
     ----------
     run : Run
         Its glstat is searched.
-    *beside : str
+    *neighbours : str
         Files whose folders are searched for a d3hsp too.
 
     Returns

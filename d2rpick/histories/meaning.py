@@ -117,7 +117,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # "total energy / initial energy" is a name with a slash, not a path
+    # not a path but a name with a slash, such as "total energy / initial energy"
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):

@@ -22,7 +22,7 @@ _ENERGY_UNITS = frozenset(
      "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
-# A unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
+# Pattern of a unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
 _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
@@ -247,7 +247,7 @@ class Namesake(Part):
 
     @property
     def name(self) -> str:
-        """Title and number."""
+        """Title and number of the part."""
         return f"{self.title} ({self.id})"
 
 

@@ -158,7 +158,7 @@ def _reopen(
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Group the files of a run by format; return notes on files of a pattern that are left out.
+    """Group the files of a run by format; also return notes on files that match a pattern but are left out.
 
     Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
     later files of a family have the format of its first file.

@@ -92,7 +92,7 @@ class OpenedRun:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with their own histories."""
+        """Parts that have their own histories."""
         holder = self._with_parts()
         return holder.parts if holder else ()
 
@@ -192,7 +192,7 @@ class OpenedRun:
 
     @cached_property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are written, in their order, NaN if unknown [mass].
+        """Masses of the parts whose momenta are written, in the order of the momenta; NaN if unknown [mass].
 
         As written, or momentum over velocity along the axis with most momentum; None if neither is written.
         """
@@ -265,7 +265,7 @@ class OpenedRun:
 
     @property
     def part_time(self) -> Samples:
-        """Times of the states of single parts [time]."""
+        """Times of the states of the parts with their own histories [time]."""
         return self._holder().part_time
 
     @cached_property
@@ -548,7 +548,7 @@ def _note_left_out_springs(springs: str) -> str:
 
 
 def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms (n, k) of a summed energy that are not always zero; a single term is returned as it is."""
+    """Add the terms (n, k) of an energy, except terms that are always zero; a single term is returned unchanged."""
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:
         return history

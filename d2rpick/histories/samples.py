@@ -42,7 +42,7 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and last of the times (n,), empty if there are none; they identify a window of a record."""
+    """Return the first and last of the times (n,), which identify a window of a record; empty if there are none."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 

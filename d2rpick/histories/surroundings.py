@@ -36,7 +36,7 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Return the possible accelerations of given parts, or of the model; None if they are unknown."""
+        """Return the possible accelerations by gravity of given parts, or of the model; None if they are unknown."""
         accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 

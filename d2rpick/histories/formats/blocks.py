@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # stands for the offset of a field that is truncated, or occurs twice in the block
 UNSURE: Final = -1
 
-_OVERLONG: Final = 512  # longer lines are written by no solver [bytes]
+_OVERLONG: Final = 512  # length of a line that exceeds all lines of solvers [bytes]
 
 CHUNK: Final = 1 << 20  # number of bytes compared at once, which fit into the cache
 # number of adjacent blocks compared as one row, which halves the time
@@ -87,7 +87,7 @@ class Grammar(NamedTuple):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
         longest_line = max(map(len, block.split(b"\n")))
-        if longest_line >= _OVERLONG:  # a damaged line hides further states
+        if longest_line >= _OVERLONG:  # a damaged line may hide further states
             fields = {
                 name: offset if name == self.time else UNSURE
                 for name, offset in fields.items()
@@ -264,7 +264,7 @@ def count_repetitions(
 def _decode_state_numbers(
     blocks: Bytes, fields: Sequence[tuple[int, int]]
 ) -> NDArray[np.int64]:
-    """Return the decimal numbers of each block, shape (blocks, fields); -1 for a number with other characters."""
+    """Return the decimal integers in each block, shape (blocks, fields); -1 for a field with other characters."""
     numbers = np.empty((len(blocks), len(fields)), dtype=np.int64)
     for column, (offset, width) in enumerate(fields):
         digits = blocks[:, offset : offset + width].astype(np.int64) - ord("0")

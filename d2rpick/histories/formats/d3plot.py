@@ -83,7 +83,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """States of files: ``rows`` (n, values) of their first words; ``ended`` if each file has its end mark; notes."""
+    """The states: ``rows`` (n, values) has their first words; ``ended`` is True if each file has its end mark."""
 
     rows: Rows
     ended: bool = True
@@ -256,7 +256,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # the states begin in the next file
+        ended = True  # this file contains no states: they begin in the next file
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]

@@ -102,7 +102,8 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        self.at += version == 4  # this version has a word for the number of chambers
+        # this version of the airbag data has a word for the number of chambers
+        self.at += version == 4
         # each value has a type and a name
         self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
@@ -127,7 +128,7 @@ class Geometry:
         self._numbering()
 
     def _begins_numbering(self, word: int) -> bool:
-        """Return True if the section of node and element numbers begins at a word."""
+        """Return True if the section of node and element numbers begins at a given word."""
         width = self._words.form.width
         if not self._words.has(word * width, _NUMBERING * width):
             return False

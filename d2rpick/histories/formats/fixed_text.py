@@ -205,7 +205,7 @@ class Blocks(Database):
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
-        """Return a piece of the complete lines of the file."""
+        """Return ``size`` bytes at an offset, up to the end of the last complete line."""
         return self._data[start : min(start + size, self._end)]
 
     def _read(
@@ -262,7 +262,7 @@ class Blocks(Database):
         raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
-        """Return the offsets of the named numbers in a sequence of blocks; FormatError if one is ambiguous."""
+        """Return the offsets of the named numbers in a sequence of blocks; raise FormatError if one is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:

@@ -223,7 +223,7 @@ def _find_rows(
             counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            # True if every row ends with a separator
+            # in this case every row ends with a separator
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
             if columns > 1 and count > best_count:

@@ -1,4 +1,4 @@
-"""Read uniform rows of numbers at once; with any pandas version the result is that of `float`."""
+"""Read uniform rows of numbers at once; the result equals that of `float` with any pandas version."""
 
 from __future__ import annotations
 
@@ -80,11 +80,12 @@ def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
 def _read_with_numpy(
     piece: bytes, layout: Layout, columns: Sequence[int] | None
 ) -> Samples:
-    """Read rows of numbers with numpy, all columns unless some are chosen; raise ValueError for anything else."""
+    """Read rows of numbers with numpy, in the given columns or all columns; raise ValueError for other rows."""
     # numbers contain no character outside Latin-1
     lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
-        raise ValueError  # numpy skips blank lines, and warns if there are no others
+        # numpy skips blank lines, and warns if there are no other lines
+        raise ValueError
     return np.loadtxt(
         lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns
     )

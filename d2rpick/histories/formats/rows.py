@@ -121,7 +121,7 @@ class _Curve:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on lines omitted below the table."""
+        """Notes on lines below the table that were left out."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -132,7 +132,7 @@ class _Curve:
         return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Store states (rows, used) of a piece that was read at once."""
+        """Store the states (rows, used) of a piece that was read at once."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
@@ -150,7 +150,7 @@ class _Curve:
     def states(
         self, rows: Sequence[str], first: int
     ) -> Iterator[tuple[int, list[float]]]:
-        """Yield line number and values of each state in ``rows``, the first of which has the line number ``first``."""
+        """Yield the line number and values of each state in ``rows``; ``first`` is the line number of the first row."""
         for number, row in enumerate(rows, first):
             if is_skipped(row):
                 self._gap = True

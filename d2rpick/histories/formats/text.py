@@ -55,7 +55,7 @@ class Text:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last line that has an end.
+        # Offset after the last terminated line.
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
@@ -302,7 +302,7 @@ def _decimals(field: str) -> int:
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equally spaced and their step can be written with fewer decimals than this."""
+    """Return True if the times are equally spaced and their step needs fewer decimals than ``decimals``."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
