@@ -374,7 +374,7 @@ class Scope:
         )
 
     def value(self, text: str) -> Number:
-        """Evaluate a field: a number, a reference or an expression; ExpressionError for other text."""
+        """Evaluate a field: a number, a reference or an expression; raise ExpressionError for other text."""
         text = text.strip()
         if text[:1] == "<" and text[-1:] == ">":
             return evaluate(text[1:-1], self._number)
@@ -465,7 +465,7 @@ class Scope:
 def _read_definitions(
     rows: Sequence[Row], options: set[str]
 ) -> Iterator[tuple[Row, str, str]]:
-    """Yield the row, the name with its type letter, and the value text of each definition on the card."""
+    """Yield the row, the name with its type letter, and the text of the value of each definition on the card."""
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return

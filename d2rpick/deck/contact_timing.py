@@ -124,7 +124,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Return the shortest waiting time that gives the planned number of windows, none before its planned start."""
+    """Return the shortest waiting time with the planned number of windows, of which none begins too early."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]

@@ -191,7 +191,7 @@ def _divide(x: Number, y: Number) -> Number:
 
 
 def _raise_to_power(x: Number, y: Number) -> Number:
-    """Raise to a power as Fortran does: integers give an integer."""
+    """Raise a number to a power as Fortran does: integers give an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 

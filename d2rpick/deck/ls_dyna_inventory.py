@@ -209,7 +209,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
 def find_shared_nodes(
     cards: Sequence[Card], bodies: Mapping[int, int]
 ) -> dict[tuple[int, int], int]:
-    """Find a shared node for each two parts that belong to different bodies and share nodes.
+    """Find a shared node for each pair of parts that belong to different bodies and share nodes.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield part and node id for each node of the elements of given parts, in the order of the deck."""
+    """Yield the part id and node id for each node of the elements of given parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
@@ -331,7 +331,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
 
 
 def _is_readable(card: Card) -> bool:
-    """Return True if the elements of a card can be read."""
+    """Return True if d2rpick can read the elements of a card."""
     _, kind, *options = card.name.split("_")
     return kind in _KINDS and set(options) <= _OPTIONS
 
@@ -348,7 +348,7 @@ def _get_id_width(card: Card) -> int:
 def _read_elements(
     card: Card, node_count: int | None = None
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield kind, part ids and node ids of the elements of a card, block by block, with the id offsets of the include.
+    """Yield the kind, part ids and node ids of a card's elements, block by block, with the id offsets of the include.
 
     ``node_count`` is the number of nodes of each element; default: those that define its size.
     """

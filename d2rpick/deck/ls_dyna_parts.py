@@ -327,7 +327,7 @@ def find_set_nodes(deck: Deck, card: Card, number: int) -> frozenset[int] | None
 
 
 def _read_node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
-    """Yield id and nodes of a node set."""
+    """Yield the id and the nodes of a node set."""
     options = card.options("SET_NODE")
     if card.data and options <= _NODE_SET_OPTIONS:
         ids = [
@@ -383,7 +383,7 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
 
 
 def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
-    """Yield id and section of each section of a card."""
+    """Yield the id and the content of each section of a card."""
     kind = card.name.split("_")[1]
     options = card.options(f"SECTION_{kind}")
     rows = card.lines

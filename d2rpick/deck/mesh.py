@@ -41,7 +41,7 @@ _HIGHEST: Final = 10**17  # upper limit of ids; a longer number would overflow
 NO_NODE: Final = -1  # index of a missing node
 _DENSE: Final = 50_000_000  # largest id for which a table of all ids is small enough
 NOTHING: Final = -1  # stands for a field that is not an id
-# Up to this number of lines all fields are parsed together, since a deck may have a card for each element.
+# Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
@@ -376,7 +376,7 @@ KINDS: Final = {
 def read_elements(
     card: Card, *, damaged: bool = False
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield kind, part ids and node ids of the elements of a card; a missing node is 0.
+    """Yield the kind, part ids and node ids of the elements of a card; a missing node has the id 0.
 
     With ``damaged`` also yield elements whose ids are incomplete.
     """

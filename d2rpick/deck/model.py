@@ -359,7 +359,7 @@ class Inventory:
     def _held_by(
         self, joints: Sequence[Joint]
     ) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return for each part the parts that these joints connect to it, with the kinds of the joints."""
+        """Return, for each part, the parts that these joints connect to it, with the kinds of the joints."""
         wanted = np.zeros(len(self.coordinates), bool)
         for _, nodes, _ in joints:
             wanted[nodes] = True

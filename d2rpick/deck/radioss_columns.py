@@ -91,7 +91,7 @@ SENSOR_INPUTS: Final = DataLine(integers("sens_ID1 sens_ID2"))
 FORCE_SENSOR: Final = DataLine(
     integers("ID"), words("Dir"), reals("Fmin Fmax Tmin", _REAL)
 )
-# A second number after Tdelay, which the solver does not read
+# A second number after Tdelay on the same line, which the solver does not read
 AFTER_DELAY: Final = DataLine(blank(_REAL), words("number", _REAL))
 
 # /RUN of an engine file

@@ -51,7 +51,7 @@ WITHOUT_FRAME: Final = {
     "SHEL16",
 }
 _RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe for a co-rotational frame
+_ICOROTATIONAL: Final = 2  # value of Iframe that selects a co-rotational frame
 # Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
 _NOT_TURNED: Final = {
     1,
@@ -438,7 +438,7 @@ class Starter:
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
-        # Flags of each property; the line of the flags may be blank.
+        # The flags of each property are read; their line may be blank.
         flags = {
             get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids
@@ -504,11 +504,11 @@ class Starter:
                 yield part
 
     def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
-        """Return kind and ids of the members of a group."""
+        """Return the kind and the ids of the members of a group."""
         return self.groups.get(group, ("", ()))
 
     def _groups_in(self, group: int) -> tuple[int, ...]:
-        """Return the node groups in a group."""
+        """Return the ids of the node groups in a group."""
         kind, ids = self._group(group)
         return ids if kind == "GRNOD" else ()
 
@@ -521,7 +521,7 @@ def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Return the ids on lines with fields of 10 columns; -1 for text that is not an id."""
+    """Return the ids on lines with fields of 10 columns; a text that is not an id gives -1."""
     cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 

@@ -222,7 +222,7 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    long: bool = False  # True if the main file ends in long format
+    long: bool = False  # True if the main file is in long format at its end
     restarts: dict[str, Restart] = field(default_factory=dict)  # restarts by file name
 
     @property
@@ -340,7 +340,8 @@ class _Reader:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        self.folders: list[Path] = []  # folders of *INCLUDE_PATH, in order
+        # folders named by *INCLUDE_PATH, in the order of the cards
+        self.folders: list[Path] = []
         # Files by path, so that a file included twice has one state.
         self.sources: dict[str, SourceFile] = {}
 

@@ -54,7 +54,7 @@ def find_marks(
     alone: int = _ALONE,
     helpers: int = _HELPERS,
 ) -> Sequence[int]:
-    """Return the offsets of each ``*`` at the beginning of a line (after blanks) and of encrypted blocks, ascending.
+    """Return, in ascending order, the offsets of encrypted blocks and of each ``*`` that begins a line (after blanks).
 
     A file of more than ``alone`` pieces of ``piece`` bytes is searched by ``helpers`` additional threads.
     """
@@ -132,7 +132,7 @@ class _Search:
             helping.acquire()
 
     def result(self) -> Sequence[int]:
-        """Return all marks; pieces left by a helper are searched here, where errors are raised."""
+        """Return all marks. Pieces that a helper left are searched here, so that errors are raised in this thread."""
         if remaining := [begin for begin in self.pieces if begin not in self._found]:
             self._waiting = iter(remaining)
             self.go_on()
@@ -164,13 +164,13 @@ def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Return the next position of a letter after the line that contains ``at``; -1 if there is none."""
+    """Return the position of the next letter after the line that contains ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
 
 def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
-    # A header that continues in the next piece is found there, because that piece begins with the end of this one.
+    # A header that crosses the end of this piece is found in the next piece, which repeats the end of this one.
     """Return the offsets of the headers of encrypted blocks."""
     offsets = []
     at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
@@ -294,7 +294,7 @@ class SourceFile:
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules; always True for a large file, which is not searched for them."""
+        """Return True if comments may silence rules. A large file is not searched for them, so the result is True."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
@@ -360,7 +360,7 @@ class Block:
         above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
             BYTE_ORDER_MARK
         )
-        # The last element contains the blanks before the keyword.
+        # The last element contains only the blanks before the keyword.
         lines = above.decode("latin-1").split("\n")[:-1]
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):

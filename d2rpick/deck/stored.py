@@ -141,7 +141,7 @@ def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _open_file(name: str) -> FileIO:
-    """Open a file; DeckError if that fails."""
+    """Open a file; raise DeckError if that fails."""
     try:
         return open(name, "rb", buffering=0)  # noqa: PTH123  starts faster; the caller closes it
     except FileNotFoundError:

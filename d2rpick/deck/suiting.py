@@ -86,7 +86,7 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Return True if there are constraints and each belongs to these parts alone, so that all may be deleted."""
+    """Return True if there are constraints and all belong to these parts alone, so that they may be deleted."""
     if not constraints:
         return False
     from d2rpick.deck.ls_dyna_inventory import (

@@ -60,7 +60,7 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of its pair (``other``) and PAIRED.
+    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of the paired set (``other``) and PAIRED.
 
     ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
     switches. 0 stands for none.

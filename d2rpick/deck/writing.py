@@ -50,7 +50,7 @@ _ONCE = {
     "END",
 }
 
-_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart file only at its end
+_NOT_REPEATED: Final = {"RFILE"}  # a leg writes its restart file only at the end
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
 
 
@@ -152,7 +152,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError if the deck switches a part of the printed cards, or uses one of their switch sets."""
+    """Raise DeckError if the deck already switches a part of the printed cards, or uses one of their set ids."""
     sets = read_switching(deck)
     printed_sets = read_switching(printed)
     parts = {
@@ -317,7 +317,7 @@ def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
 def _edit_lines(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Yield the changed line as its offset, its end and its new bytes."""
+    """Yield a changed line as the offset of its start, the offset of its end, and its new bytes."""
     card = make_card(block)
     for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
