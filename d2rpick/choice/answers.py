@@ -292,7 +292,12 @@ class PairSuggestion(AnswerAtTd):
         best = self.chosen
         if best is None:
             return None
-        return decide(self.situation, best, better=self._good_pair)
+        return decide(
+            self.situation,
+            best,
+            better=self._good_pair,
+            best_of=None if self.clearly_better else self.td_window,
+        )
 
     @property
     def _good_pair(self) -> Pair | None:

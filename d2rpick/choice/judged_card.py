@@ -163,7 +163,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     yield f"{judged}:{which} {verdict_text}. {_format_as_sentence(decision.reason)}"
     if decision.cure:
         yield f"To improve: {decision.cure}."
-    yield f"After td: {decision.expected}. At worst: {decision.worst_case}."
+    yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
     if verdict.situation.at_rest:  # there is no level to match, as the warning says
         return
     measures = [

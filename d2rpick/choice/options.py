@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.options import (
     AT_LEAST_ONE,
@@ -22,6 +22,10 @@ from d2rpick.choice.pair.grades import GRADES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+
+# Names of quantities in messages that differ from their keys.
+_QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
@@ -57,7 +61,7 @@ class Limit(NamedTuple):
         # imported here: a start needs no message
         from d2rpick.histories.digits import format_beyond_limit
 
-        name = self.quantity.replace("_", " ")
+        name = _QUANTITIES.get(self.quantity, self.quantity.replace("_", " "))
         if value is None:
             bound = "at least" if self.is_lower else "at most"
             return f"{name} unknown, {bound} {limit:g} was asked for"

@@ -156,7 +156,10 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
 def _describe_health(health: Health | None) -> str:
     """Describe that the energies are within their limits, as far as they are written."""
     if health is None or health.energy_ratio_min is None:
-        return "the files do not contain the energy balance that shows whether a run is sound"
+        return (
+            "the health of the run is unknown, because the files contain no energy balance "
+            "(LS-DYNA glstat, Radioss T01)"
+        )
     return "energies are within their usual limits"
 
 

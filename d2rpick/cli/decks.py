@@ -195,12 +195,14 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name i
     --------
     d2rpick rule
     d2rpick rule D2R105
+    d2rpick rule -v D2R105
     d2rpick rule poor-td
     """
     from d2rpick.report.findings import explain_rules, list_rules
 
     output = output.beside()
-    text = explain_rules(id, output.shown().width)
+    display = output.shown()
+    text = explain_rules(id, display.width, with_examples=display.verbose)
     output.result(
         text or replace_arguments_for_people(list_rules(), "table", output.columns)
     )

@@ -94,7 +94,7 @@ def write_engine_lines(
 def write_step_limit(cap: float) -> Iterator[str]:
     """Yield the lines that limit the time step while bodies are rigid."""
     yield from (
-        "# with nothing deformable left the step would grow without limit",
+        "# limits the time step, which would grow if no deformable part is left",
         "/DTIX",
         f"{cap!r} {cap!r}",
     )

@@ -25,11 +25,11 @@ _MOST_DIGITS = 17
 _COMMENT_WIDTH = 78
 
 PHYSICS = (
-    "The energy frozen at the first switch springs back at the second; the",
-    "  kinetic energy of the vibration is lost, and no energy output shows it.",
-    "The solver switches at the first time step at or after each time.",
-    "Stresses of solids without a co-rotational frame do not rotate with the rigid",
-    "  body: after a large rotation they spring back in the wrong direction.",
+    "The strain energy frozen at the first switch is released at the second. The",
+    "  kinetic energy of the vibration is lost; no energy output shows it.",
+    "A switch takes place at the first time step at or after its time.",
+    "Stresses of solids without a co-rotational stress update do not rotate with",
+    "  the rigid body. After a large rotation their springback is wrong.",
     "Do not choose switching times from the energy of a switched run.",
 )
 

@@ -62,13 +62,14 @@ _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the
 _DELETE, _ACTIVATE = 1, 2
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
-    "  (NRBF, NCSF, RWF 0); if any, delete them (1) and reactivate them (2).",
+    "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
+    "  2 (activate again) on the second.",
 )
 _DELETED = (
     "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
     "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
 )
-_CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
+_CAPPED = "DTMAX limits the time step, which would grow if no deformable part is left."
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _OF_RADIOSS = (
@@ -269,8 +270,8 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
     """Yield a note for each time that the card cannot write exactly."""
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
-            difference = f"{float(text) - value:+.1e} off {value!r}"
-            yield f"{name} is printed as {text}, {difference}: nearest in {LONGEST} characters."
+            error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
+            yield f"{name} = {value!r} is rounded to {text} ({error})."
 
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:

@@ -30,7 +30,7 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
     Field("misfit", "number"),
     Field("legs", many(_LEG)),
 ), closed=True)  # fmt: skip
-HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")
+HEAD = ("formulation", "weight", "built-in weight", "source")
 COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
@@ -40,9 +40,9 @@ def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
     weights = calibration.weights
     lines = [
         tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",
-        f"elements of a step  {weights.element_share:.3f}",
-        f"node of a body      {weights.rigid_node:.3g} us",
-        f"misfit              {calibration.misfit:.1%} of the time of a leg", "",
+        f"fraction of a time step spent on elements  {weights.element_share:.3f}",
+        f"cost per node of a rigid body              {weights.rigid_node:.3g} us",
+        f"misfit                                     {calibration.misfit:.1%} of the CPU time of an engine run", "",
         tables.as_text(LEG_HEAD, _list_leg_rows(calibration), display.width),
     ]  # fmt: skip
     return "\n".join(lines)
@@ -82,7 +82,7 @@ def _list_weight_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
             name,
             f"{weight:.3g}",
             f"{MEASURED[name]:.3g}",
-            "these legs" if name in calibration.told else "ratio as measured",
+            "these engine runs" if name in calibration.told else "ratio as measured",
         ]
         for name, weight in calibration.weights.per_element.items()
     ]

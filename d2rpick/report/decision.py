@@ -40,15 +40,14 @@ def list_statements(decision: Decision) -> Lines:
     alone = decision.quality.alone
     worth = decision.quality.worth
     raised = "" if alone.grade == vibration.grade else f", by itself {alone.grade}"
+    share = ""
     if worth:
-        share = f"; its error is at most {worth.share:.2%} of the energy of the next contact"
-    else:
-        share = ""
+        share = f"; the energy of its error is at most {worth.share:.2%} of the energy of the next contact"
     return [
         ("motion", f"{motion.grade}{explain_grade(motion, decision)}"),
         (
             "vibration",
-            f"{vibration.grade}{raised}{explain_grade(alone, decision)}{share}",
+            f"{vibration.grade}{raised}{share}{explain_grade(alone, decision)}",
         ),
     ]
 
@@ -58,8 +57,9 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
-    cures = "; ".join(dict.fromkeys(cause.cure for cause in causes))
-    return f": {'; '.join(cause.reason for cause in causes)}. To improve: {cures}"
+    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, causes)))
+    reasons = "; ".join(cause.reason for cause in causes)
+    return f". Reason: {reasons}. To improve: {cures}"
 
 
 def format_in_short(decision: Decision) -> str:
@@ -89,7 +89,7 @@ def format_accuracy(best: Candidate) -> str:
     if best.timing_tolerance is None:
         room = ""
     else:
-        room = f"any tr within ±{best.timing_tolerance:.1g} is nearly as good (error larger by at most 0.05)"
+        room = f"timing tolerance ±{best.timing_tolerance:.1g} (the error grows by at most 0.05)"
     return "; ".join(filter(None, (interval, room)))
 
 

@@ -17,6 +17,7 @@ from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
 from d2rpick.report.decision import format_saved_share
 from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
+from d2rpick.report.situation import label_deformation, label_energy
 from d2rpick.report.suggestion import describe_acceptable_windows
 from d2rpick.report.tables import (
     fill_table,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import AcceptableWindow
     from d2rpick.choice.pair.candidates import Candidate
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
@@ -179,6 +181,8 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time (unit of the run)",
+        "energy_label": label_energy(history.energy_unit),
+        "deformation_label": label_deformation(history.energy_unit),
         "error": _name_error(trade_off.offers),
         "saved": _name_saving(trade_off.offers),
         "view": [view.start, view.end],
@@ -248,7 +252,9 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
     }
     names, numbers = fill_table(columns, trade_off.offers)
     texts = [
-        _list_texts(offer, first, f" {unit}" if unit else "")
+        _list_texts(
+            offer, trade_off.decide_on(offer), first, f" {unit}" if unit else ""
+        )
         for offer in trade_off.offers
     ]
     text_names = list(
@@ -308,10 +314,11 @@ def _name_saving(offers: Sequence[Offer]) -> str:
     return "rigid, % of the simulated time"
 
 
-def _list_texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
+def _list_texts(
+    offer: Offer, decision: Decision | None, start: Offer, unit: str
+) -> dict[str, str | None]:
     """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
     best = offer.best
-    decision = offer.decision_with_cure
     return {
         "td": format_short(offer.td),
         "tr": format_short(best.tr) if best else "none",

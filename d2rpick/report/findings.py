@@ -42,6 +42,11 @@ _SARIF: Final = {
     Severity.WARNING: "warning",
     Severity.INFO: "note",
 }
+_NOUNS: Final = (
+    "error",
+    "warning",
+    "info message",
+)  # of the severities, in their order
 _NOT_XML: Final = (
     "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled at first use
 )
@@ -366,8 +371,8 @@ def _summarize_findings(checks: Checks) -> str:
     """Return the number of findings and decks, and which input was not judged."""
     results = checks.results
     counted = [
-        f"{count} {name if count != 1 else name[:-1]}"
-        for name, count in _count_severities(results).items()
+        f"{count} {noun}{'s' * (count != 1)}"
+        for noun, count in zip(_NOUNS, _count_severities(results).values(), strict=True)
     ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
@@ -414,8 +419,12 @@ def list_rules() -> str:
     )
 
 
-def explain_rules(names: Iterable[str], width: int) -> str:
+def explain_rules(
+    names: Iterable[str], width: int, *, with_examples: bool = False
+) -> str:
     """Explain the rules with these ids or prefixes, and the warnings with these codes.
+
+    ``with_examples``: add decks that pass and decks that fail, which can be hundreds of lines.
 
     Raises
     ------
@@ -423,11 +432,15 @@ def explain_rules(names: Iterable[str], width: int) -> str:
         If there is no such rule or warning.
     """
     return "\n\n\n".join(
-        text for name in names for text in _explain_matching_rules(name, width)
+        text
+        for name in names
+        for text in _explain_matching_rules(name, width, with_examples=with_examples)
     )
 
 
-def _explain_matching_rules(name: str, width: int) -> Iterator[str]:
+def _explain_matching_rules(
+    name: str, width: int, *, with_examples: bool
+) -> Iterator[str]:
     """Explain the rules whose id begins with ``name``, or the warning with this code."""
     from d2rpick.report.warning_texts import EXPLANATIONS, explain_warning
 
@@ -435,17 +448,25 @@ def _explain_matching_rules(name: str, width: int) -> Iterator[str]:
         yield tables.wrap_lines(explain_warning(name), width)
         return
     for rule in find_rules(name):
-        yield explain_rule(rule, width)
+        yield explain_rule(rule, width, with_examples=with_examples)
 
 
-def explain_rule(rule: Rule, width: int) -> str:
-    """Explain one rule: its finding, its importance, and decks that pass and fail, as wide as their cards."""
+def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
+    """Explain one rule: its finding, its importance, and decks that pass and fail, as wide as their cards.
+
+    Without the decks the last line says how to print them.
+    """
     from textwrap import wrap  # imported here: findings do not need it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     explained = wrap(rule.explanation, width, break_on_hyphens=False)
     lines = [tables.wrap_lines(title, width), "", *explained]
     lines += ["", *wrap(f"Fix: {rule.fix}", width, break_on_hyphens=False)]
+    if not with_examples:
+        count = len(rule.passing) + len(rule.failing)
+        return "\n".join(
+            [*lines, "", f"Example decks ({count}): d2rpick rule -v {rule.id}"]
+        )
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_format_example(title, example, width)]

@@ -129,7 +129,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
-    lines = [("this run", overview.verdict), ("why", overview.reason)]
+    lines = [("verdict", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
         cure = None if overview.unjudged else overview.should_write

@@ -572,7 +572,7 @@ def _build_health(health: Health | None) -> Iterator[Markup]:
     ]
     yield build_scrolling_table(
         "Health of the reference run",
-        ("measure", "this run", "practice", "verdict"),
+        ("measure", "this run", "usual limit", "verdict"),
         listed,
     )
     window = health.window

@@ -326,17 +326,18 @@ def build_set_table(
     )
 
 
-def _format_position_error(part_set: PartSet) -> str | None:
+def _format_position_error(part_set: PartSet) -> str:
     """Return the position error of a set, and the assumption behind it."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
 
-def _format_lower_bound(part_set: PartSet, value: float | None) -> str | None:
-    """Return an error, with a sign if it is only a lower limit."""
-    if part_set.position_is_lower_bound and value is not None:
-        return f">= {value:.3g}"
-    return _format_short(value)
+def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
+    """Return an error, with a sign if it is only a lower limit; "unknown" without a value, which is not zero."""
+    if value is None:
+        return "unknown"
+    sign = ">= " if part_set.position_is_lower_bound else ""
+    return f"{sign}{value:.3g}"
 
 
 def name_verdict(row: PartRow) -> str:
@@ -349,6 +350,14 @@ def name_verdict(row: PartRow) -> str:
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
     best = answer.recommended
+    if best is None and answer.inventory is None:
+        return [
+            (
+                "make rigid",
+                "unknown: without the deck of the run no part can be judged",
+            ),
+            ("to improve", "give the main deck with `deck`"),
+        ]
     if best is None:
         why = next(
             (part_set.reasons[0] for part_set in answer.sets if part_set.reasons),
@@ -397,10 +406,8 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
         else:
             much = f"{best.step_growth:.2g} times"
         grows = f"may grow {much} while these parts are rigid"
-        cures = (
-            "set a maximum with --step-cap; --step-ratio adds its gain to the saving"
-        )
-        lines.append(("time step", f"{grows}: {cures}"))
+        cures = "limit it with --step-cap; to include its gain in the saving, give --step-ratio"
+        lines.append(("time step", f"{grows}; {cures}"))
     lines += [
         (name_set(part_set), reason)
         for part_set in answer.sets

@@ -230,8 +230,12 @@ def give_plan_sentence(plan: RunPlan) -> str:
     text = f"{_describe_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
-    waiting_text = "1 more needs" if waiting == 1 else f"{waiting} more need"
-    return f"{text}; {waiting_text} a new run first" if waiting else text
+    if not waiting:
+        return text
+    more = (
+        "1 more window requires" if waiting == 1 else f"{waiting} more windows require"
+    )
+    return f"{text}; {more} a new run"
 
 
 def _describe_use(plan: RunPlan) -> str:
@@ -267,11 +271,14 @@ def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
     if not plan.windows:
         return []
     waiting = any(row.status == "re-plan" for row in plan.flights)
-    cards = "print the cards with -f card, and run the deck with them from the start"
+    cards = "print the cards with -f card"
     if plan.done:
-        cards += "; they contain the windows that are done too"
-    again = "; then plan the others from that run (--done)" if waiting else ""
-    return [("next", f"{cards}{again}")]
+        cards += " (they also contain the windows that are done)"
+    rerun = "add them to the deck, and run the deck from t = 0"
+    again = (
+        ". Then plan the remaining flights from that run (--done)" if waiting else ""
+    )
+    return [("next", f"{cards}, {rerun}{again}")]
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:

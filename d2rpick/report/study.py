@@ -87,7 +87,7 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
     Field("agree", "flag?", "True if the intervals from tr_low to tr_high of these runs have a time in common."),
     Field("common_tr", "number?",
-          "The tr of all runs if they agree. Otherwise the earliest tr that is acceptable in every run with status ok "
+          "The tr of all runs if they agree. Otherwise the earliest tr that is admissible in every run with status ok "
           "or none, and within the timing tolerance of each, if there is one.", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "What to do with common_tr: the verdict for the worst run, from its own pair and from its error at "
@@ -181,6 +181,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
     cut = {
         row.source: f"cut at {row.record_end:g}; " for row in find_cut_runs(answer.runs)
     }
+    has_failures = any(row.status != OK for row in answer.runs)
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda run_and_error: run_and_error[0].source,
         "tr": lambda run_and_error: run_and_error[0].tr,
@@ -198,7 +199,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
         "verdict": lambda run_and_error: run_and_error[0].verdict,
         "basis": lambda run_and_error: run_and_error[0].basis,
         "status": lambda run_and_error: (
-            None if run_and_error[0].status == OK else run_and_error[0].status
+            run_and_error[0].status if has_failures else None
         ),
         "why": lambda run_and_error: (
             cut.get(run_and_error[0].source, "")

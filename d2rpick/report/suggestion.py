@@ -77,7 +77,7 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     Field("td_window", "span?",
           "range in which td was chosen: --td-window, or the longest flight; null if td was given"),
     Field("longer_pair", maybe(keys.PAIR),
-          "longest acceptable pair in td_window, if it is much longer than the recommended pair but of lower quality",
+          "longest admissible pair in td_window, if it is much longer than the recommended pair but of lower quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     Field("candidates", many(CANDIDATE), get=_add_decisions),
@@ -264,11 +264,13 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
     else:
         better_quality = f"residual {tables.format_measure(longer.residual)}"
     lost = longer.rigid_time - chosen.rigid_time
-    times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
-    return (
-        f"{times}, with {better_quality}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for a "
-        "smaller error"
+    times = (
+        f"tr = {longer.tr:.6g}, td = {longer.td:.6g}, rigid for {longer.rigid_time:.6g}"
     )
+    shorter = (
+        f"the recommended window is {lost:.6g} ({lost / longer.rigid_time:.0%}) shorter"
+    )
+    return f"a longer window exists ({times}), but it has {better_quality}; {shorter}"
 
 
 def describe_acceptable_windows(

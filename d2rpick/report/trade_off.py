@@ -60,7 +60,8 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
-_NOT_HALVED: Final = "halves the error and keeps half of the rigid time"
+_NONE_BETTER: Final = "No other td in the range is better."
+_NOT_HALVED: Final = "No other td in the range halves this error without giving up more than half of the rigid time."
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -95,10 +96,11 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
     """Return what to do with the recommended pair, why, and how to improve it, as pairs of a name and a text."""
     best = trade_off.recommended
-    decision = best.decision_with_cure if best else None
+    decision = trade_off.decide_on(best) if best else None
     if best is None or best.best is None or decision is None:
         return [("no pair to use", _explain_why_no_pair(trade_off))]
-    return list_verdict_lines(decision, best.best.tr, best.td)
+    (verdict, times), *others = list_verdict_lines(decision, best.best.tr, best.td)
+    return [(verdict, f"{times}, the best pair of the range"), *others]
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
@@ -144,7 +146,7 @@ def give_answer(trade_off: TradeOff) -> str:
         quality_text = f"{start_text}: {_format_offer_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{quality_text}; no other td in the range {'is better' if small else _NOT_HALVED}"
+        return f"{quality_text}. {_NONE_BETTER if small else _NOT_HALVED}"
     distance = _describe_distance(start, step, unit)
     error_change = _describe_error_change(start, step)
     cost_change = _describe_cost_change(start, step)
@@ -163,8 +165,8 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
           "td with which the others are compared: the given td, otherwise the td with the largest saving",
           lambda trade_off: trade_off.start and trade_off.start.td),
     Field("step", "number?",
-          "nearest Pareto-optimal td with at most half of the error at start; otherwise the recommended td if its "
-          "error is smaller",
+          "nearest td with at most half of the error at start and at least half of its rigid time: an energy peak, "
+          "otherwise a Pareto-optimal td, otherwise the recommended td if its error is smaller",
           lambda trade_off: trade_off.step and trade_off.step.td),
     Field("offers", many(OFFER),
           "evenly spaced values of td, the peaks of the energy, the given td and the recommended td, by ascending td"),

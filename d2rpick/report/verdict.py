@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
+from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_accuracy,
@@ -72,7 +73,10 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
-    lines = tables.format_in_line(list_pair_verdict(answer))
+    verdict_lines = list_pair_verdict(answer)
+    if answer.switched:
+        verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
+    lines = tables.format_in_line(verdict_lines)
     if answer.switched:
         lines += ["", *_format_comparison(answer.switched)]
     listed = [*list_pair_evidence(answer), *above, *remarks]
@@ -91,6 +95,24 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
 def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
     """Return what to do with the pair, why, and how to improve it, as pairs of a name and a sentence."""
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
+
+
+def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
+    """Return whether the switched run agrees with the reference run, with the limits, after the name of the line."""
+    compared = []
+    if switched.mean_after_reference > 0:
+        ratio = switched.mean_after / switched.mean_after_reference
+        limits = f"{switched.min_mean:g} to {2 - switched.min_mean:g}"
+        compared.append(
+            f"mean energy after td {ratio:.2f} times that of the reference run (limits {limits})"
+        )
+    if switched.momentum_error is not None:
+        limit = f"limit {MOST_MOMENTUM_ERROR:.0%}"
+        compared.append(
+            f"momentum error after td {switched.momentum_error:.2%} ({limit})"
+        )
+    verdict = "failed" if switched.objections else "passed"
+    return "comparison", ": ".join(filter(None, (verdict, ", ".join(compared))))
 
 
 def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
@@ -128,11 +150,12 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
 
 def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
     """Return the verdict, and the measures as a Markdown table of two columns."""
+    switched = answer.switched
+    comparison_lines = [list_comparison_verdict(switched)] if switched else []
     paragraphs = tables.format_as_list(
-        (*list_pair_verdict(answer), *list_pair_evidence(answer))
+        (*comparison_lines, *list_pair_verdict(answer), *list_pair_evidence(answer))
     )
     table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
-    switched = answer.switched
     if switched:
         compared = [
             tables.as_markdown(COMPARED, compare_values(switched)),

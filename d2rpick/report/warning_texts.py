@@ -120,8 +120,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
     },
     "The record": {
         "coarse-record": Explanation(
-            "The fastest strong vibration has few states per period. The record may hide a faster vibration, and the "
-            "error after td may then be larger than stated.",
+            "The fastest line of the energy, even a weak one, has fewer than 4 states per period. The verdict rests on "
+            "the strong lines. The record may hide a faster vibration, and the error after td may then be larger "
+            "than stated.",
             "Write the energies more often: at least ten states per period of the fastest vibration.",
         ),
         "engine-wrong-energy": Explanation(

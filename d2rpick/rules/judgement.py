@@ -38,6 +38,8 @@ from d2rpick.histories.surroundings import UNKNOWN
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
     from d2rpick.histories.history import History
@@ -286,17 +288,14 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
         yield Fault("D2R209", False, what)
     elif (
-        situation.kinetic_share is not None
-        and situation.kinetic_share > POOR_KINETIC_SHARE
+        _loses_most(situation)
         # one mistake yields only one finding
         and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
-        cure = "no better td was found"
-        if better:
-            cure = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}"
+        cure = _name_pair(better) if better else "no better td was found"
         problem = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
-        yield Fault("D2R203", True, f"{problem} and no tr can keep it; {cure}")
+        yield Fault("D2R203", True, f"{problem} and is lost for every tr; {cure}")
 
 
 def _judge_open_window(
@@ -352,7 +351,7 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
         # Without a vibration the energy at any tr equals the energy at td, apart from rounding.
         return
     if candidate.sign_match is False:
-        quantity = "at tr the deformation has the opposite direction"
+        quantity = "the deformations at tr and td have opposite directions"
         yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
         return
     if candidate.lock_in_error is not None:
@@ -383,12 +382,29 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Return the cure: a tr that suits this td, a better pair, or advice on where to look for a pair."""
-    suggestion = suggest_at(verdict.situation, with_better=False)
+    """Return the cure: a tr that suits this td, a better pair, or advice on where to look for a pair.
+
+    A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
+    """
+    situation = verdict.situation
+    if _loses_most(situation):
+        better = find_better_pair(situation)
+        if better:
+            return _name_pair(better)
+    suggestion = suggest_at(situation, with_better=False)
     if suggestion.recommended:
-        return f"tr = {suggestion.recommended.tr:.6g} suits this td"
-    if better := find_better_pair(verdict.situation):
-        return (
-            f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"
-        )
+        return f"for this td, use tr = {suggestion.recommended.tr:.6g}"
+    if better := find_better_pair(situation):
+        return f"no tr suits this td; {_name_pair(better)}"
     return "no tr suits this td; see d2rpick suggest"
+
+
+def _loses_most(situation: Situation) -> bool:
+    """Return True if more than half of the vibration energy is kinetic at td, and so lost for every tr."""
+    share = situation.kinetic_share
+    return share is not None and share > POOR_KINETIC_SHARE
+
+
+def _name_pair(pair: Pair) -> str:
+    """Return the advice to use a pair."""
+    return f"use td = {pair.td:.6g} with tr = {pair.tr:.6g}"

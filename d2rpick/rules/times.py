@@ -447,14 +447,14 @@ def _check_locked_in_error(case: Case) -> Iterator[Objection]:
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0122659", "0.064"))
 @make_rule_decorator(
-    "D2R202", ERROR, "at tr the deformation has the opposite direction", BOTH
+    "D2R202", ERROR, "the deformations at tr and td have opposite directions", BOTH
 )
 def _check_sign(case: Case) -> Iterator[Objection]:
     """In each oscillation cycle a part passes every energy level twice in tension and twice in compression. If the
     frozen deformation has the wrong sign, the vibration after td is worse than without any frozen deformation. The sign
     is known only if an oscillator describes the history.
 
-    Fix: Replace tr by the time in the finding, which has the right sign.
+    Fix: Replace tr, or both times, by the times in the finding, which have the right sign.
     """
     return _report_faults(case, "D2R202")
 
@@ -524,7 +524,9 @@ def _check_flight(case: Case) -> Iterator[Objection]:
 
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0135867", "0.16"))
-@make_rule_decorator("D2R205", ERROR, "tr or td outside the reference history", BOTH)
+@make_rule_decorator(
+    "D2R205", ERROR, "tr or td outside the record of the reference run", BOTH
+)
 def _check_in_history(case: Case) -> Iterator[Objection]:
     """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.
     d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td

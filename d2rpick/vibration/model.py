@@ -417,6 +417,12 @@ class Evidence(NamedTuple):
         return modal.states_per_period if modal else None
 
     @property
+    def states_per_strong_period(self) -> float | None:
+        """Return the states per period of the fastest strong line [-]; None if no lines were searched."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal.doubts.coarse if modal else None
+
+    @property
     def has_model(self) -> bool:
         """Return True if more than the samples of the energy may be used at some td."""
         fit = self.fit

@@ -64,7 +64,7 @@ class Swings(SignedAmplitudes):
     bottoms: Samples
     floor: Samples
     signed: ClassVar = True
-    told: ClassVar = "swings of the energy, counted"
+    told: ClassVar = "counted cycles of the energy"
     kinetic: ClassVar = "the counted swings leave"
     undescribed: ClassVar = "the swings of the energy cannot be counted from here to td"
 

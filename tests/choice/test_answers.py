@@ -378,7 +378,9 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
 
 def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
     verdict = verify_run(read_reference([GLSTAT]), 0.02, 0.0687, PLAIN)
-    assert any("suits this td" in fault.message for fault in find_faults(verdict))
+    assert any(
+        "for this td, use tr = " in fault.message for fault in find_faults(verdict)
+    )
 
 
 def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:

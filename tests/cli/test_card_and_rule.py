@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
+from d2rpick.report.findings import explain_rules
 from d2rpick.report.formats import FORMATS
 from d2rpick.rules import RULES
 from tests import paper
@@ -113,7 +114,7 @@ def test_a_rounded_time_is_told_and_judged() -> None:
     result = run(
         "card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY
     )
-    assert "note: tr is printed as .01288528, " in result.stderr
+    assert " is rounded to .01288528 (nearest in 9 characters" in result.stderr
     assert check_pasted(result) == [(1, 0.01288528, 0.064)]
     assert ": DO NOT USE. The vibration after td is wrong by 96%" in join_comments(
         result.stdout
@@ -395,7 +396,7 @@ def test_rules_are_listed() -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_is_explained_with_its_examples(name: str) -> None:
-    text = run("rule", name.lower()).stdout
+    text = run("rule", "-v", name.lower()).stdout
     rule = RULES[name]
     assert " ".join(text.split()).startswith(
         f"{name} ({rule.severity}): {rule.summary}"
@@ -408,8 +409,17 @@ def test_a_rule_is_explained_with_its_examples(name: str) -> None:
     assert text.count("Fails") == len(rule.failing)
 
 
+def test_a_rule_without_its_examples_fits_on_a_screen() -> None:
+    for name, rule in RULES.items():
+        lines = explain_rules([name], 100).splitlines()
+        assert len(lines) <= 24
+        count = len(rule.passing) + len(rule.failing)
+        assert lines[-1] == f"Example decks ({count}): d2rpick rule -v {name}"
+    assert run("rule", "D2R406").stdout == f"{explain_rules(['D2R406'], 100)}\n"
+
+
 def test_an_example_that_is_judged_by_a_history_says_how_to_run_it() -> None:
-    text = run("rule", "D2R204").stdout
+    text = run("rule", "-v", "D2R204").stdout
     example_command = (
         text.split("history of\n")[1].split("\nchecked")[0].replace("\\\n", "")
     )

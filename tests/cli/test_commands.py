@@ -208,7 +208,7 @@ def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
 @pytest.mark.parametrize(
     ("limit", "measure"),
     [
-        (("--max-kinetic-share", "0.5"), "kinetic share"),
+        (("--max-kinetic-share", "0.5"), "kinetic fraction"),
         (("--max-residual", "0.9"), "residual"),
     ],
 )

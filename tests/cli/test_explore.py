@@ -83,10 +83,32 @@ def test_the_sentence_says_what_a_step_changes() -> None:
         exploration["recommended"]["td"],
     )
     near = run_json("explore", "--td", "0.07", *WINDOW, ENERGY)["answer"]
-    assert near.startswith("td = 0.07: residual 0.299; 0.001 earlier (")
-    assert "costs 1." in near
+    assert near.startswith(
+        "td = 0.07: residual 0.299; 0.0012 earlier (tr = 0.0135867, td = 0.0687534)"
+    )
+    assert "costs 2.3% of the rigid time" in near
     good = run_json("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
-    assert good == "td = 0.0687534: residual 0.000; no other td in the range is better"
+    assert good == "td = 0.0687534: residual 0.000. No other td in the range is better."
+
+
+@pytest.mark.parametrize("td", ["0.03", "0.064", "0.101"])
+def test_the_step_in_a_long_window_is_the_pair_that_suggest_names(td: str) -> None:
+    """The nearest Pareto-optimal td can be several periods away; suggest names the nearest peak."""
+    exploration = run_json("explore", "--td", td, "--steps", "40", ENERGY)
+    suggestion = run_json("suggest", "--td", td, ENERGY)
+    assert exploration["step"] == suggestion["better_td"]["td"]
+
+
+def test_the_best_pair_of_a_flight_is_not_cured_by_other_times() -> None:
+    """The cure of the pair that suggest and explore choose must not lead back to explore."""
+    chosen = ("--part", "1,2", "--no-deck", MATSUM)
+    suggestion = run_json("suggest", *chosen)
+    assert suggestion["verdict"] == "use with care"
+    cure = suggestion["cure"]
+    assert cure.startswith("no clearly better pair was found for td from 0.086 to ")
+    assert "explore" not in cure
+    explored = " ".join(run("explore", *chosen, "--steps", "20").stdout.split())
+    assert f"to improve {cure} expect" in explored
 
 
 def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
@@ -122,7 +144,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
     )
     assert exploration["step"] is None
     assert exploration["answer"].endswith(
-        "; no other td in the range halves the error and keeps half of the rigid time"
+        ". No other td in the range halves this error without giving up more than half of the rigid time."
     )
 
 
@@ -180,7 +202,10 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
         tmp_path / "ramp.csv",
         "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)),
     )
-    assert "give the end of the load as --after" in run("explore", str(ramp)).stderr
+    assert (
+        "if you know the end of the load, give it as --after"
+        in run("explore", str(ramp)).stderr
+    )
     run_result = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
     assert (run_result.exit_code, result.exit_code) == (1, 1)

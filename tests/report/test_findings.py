@@ -57,7 +57,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     )
     assert (
         lines[-1]
-        == "1 error, 0 warnings, 1 info in 2 decks; times not judged: no `history`"
+        == "1 error, 0 warnings, 1 info message in 2 decks; times not judged: no `history`"
     )
 
 
@@ -162,7 +162,9 @@ def test_only_a_deck_of_another_name_is_named() -> None:
         name
         for rule in RULES.values()
         for name in re.findall(
-            r"^\w+, as (\S+):$", report.explain_rule(rule, 100), re.MULTILINE
+            r"^\w+, as (\S+):$",
+            report.explain_rule(rule, 100, with_examples=True),
+            re.MULTILINE,
         )
     ]
     assert deck_names

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
-    from d2rpick.choice.pair.quality import Quality
+    from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
 
 # Cures of a pair that is not admissible: one for any pair,
@@ -28,6 +28,12 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
+# What to do if the pair is the best of all td in a range: by whether it can be used, after naming the range.
+_USE_BEST: Final = (
+    "use this pair if only the motion matters, compare it with a finished switched run (d2rpick verify), "
+    "or make fewer parts rigid (d2rpick parts)"
+)
+_AVOID_BEST: Final = "choose another flight, or make other parts rigid (d2rpick parts)"
 # A worst case that differs by less from the expected residual is not shown separately [-].
 _ALIKE: Final = 5e-3
 
@@ -55,6 +61,8 @@ class Decision(NamedTuple):
         A better pair, if one was searched and found.
     cure_of_objections : str
         What to do about the objections without a better pair.
+    best_of : (float, float) or None
+        Range of td of which the pair is the best [time]; None if not all its td were compared.
     """
 
     grade: str
@@ -66,6 +74,7 @@ class Decision(NamedTuple):
     worst_residual: float
     better: Pair | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
+    best_of: tuple[float, float] | None = None
 
     @property
     def verdict(self) -> str:
@@ -96,11 +105,11 @@ class Decision(NamedTuple):
         parts = []
         if self.mean_energy_bounds is not None:
             parts.append(
-                f"{format_bounds(self.mean_energy_bounds)} of the mean energy of the reference run after td"
+                f"mean energy after td {format_bounds(self.mean_energy_bounds)} of the reference run"
             )
         if self.residual is not None:
             parts.append(f"vibration wrong by {self.residual:.1%}")
-        return "; ".join(parts) or "unknown: no model of the vibration fits the record"
+        return ", ".join(parts) or "unknown: no model of the vibration fits the record"
 
     @property
     def worst_case(self) -> str:
@@ -119,12 +128,20 @@ class Decision(NamedTuple):
         """Change that would make the pair better; empty if it is good."""
         if self.grade == GOOD:
             return ""
-        cures = dict.fromkeys(cause.cure for cause in self.quality.causes)
-        if self.objections or not cures:
-            cures = {self.cure_of_objections: None}
-        if self.better is None:
-            return "; ".join(cures)
-        return f"use {_describe_pair(self.better)}"
+        if self.better is not None:
+            return f"use {_describe_pair(self.better)}"
+        if self.objections or not self.quality.causes:
+            return self.cure_of_objections
+        cures = dict.fromkeys(map(self.specify_cure, self.quality.causes))
+        return "; ".join(cures)
+
+    def specify_cure(self, cause: Cause) -> str:
+        """Return the cure of a cause; the best pair of a range cannot be cured by other times in it."""
+        if self.best_of is None or not cause.needs_other_times:
+            return cause.cure
+        low, high = self.best_of
+        advice = _AVOID_BEST if self.grade == POOR else _USE_BEST
+        return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
 
 
 def decide(
@@ -134,10 +151,12 @@ def decide(
     objections: Sequence[str] = (),
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
+    best_of: tuple[float, float] | None = None,
 ) -> Decision:
     """Decide on a tr in a situation; any ``objections`` make it inadmissible, ``better`` is a better pair.
 
-    Without a better pair, ``cure_of_objections`` says what to do about them.
+    Without a better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which
+    the pair is the best [time], if all were compared.
     """
     quality = grade_pair(situation, candidate)
     return Decision(
@@ -150,6 +169,7 @@ def decide(
         worst_residual=_find_worst_residual(situation, candidate),
         better=better,
         cure_of_objections=cure_of_objections,
+        best_of=best_of,
     )
 
 

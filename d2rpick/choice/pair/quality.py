@@ -185,10 +185,14 @@ def list_exceeded_limits(
 
 
 class Cause(NamedTuple):
-    """The ``reason`` why a grade is not better, and the ``cure`` that would improve it."""
+    """The ``reason`` why a grade is not better, and the ``cure`` that would improve it.
+
+    ``needs_other_times``: the cure is another tr or td.
+    """
 
     reason: str
     cure: str
+    needs_other_times: bool = False
 
 
 _NOT_CERTAIN: Final = Cause(
@@ -325,7 +329,8 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     other_parts = situation.together.not_chosen.parts
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
-        return f"name all parts that vibrate together with `parts`, here also {names}"
+        vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
+        return f"also give {names} in `parts`, because {vibrates} together with the chosen parts"
     return "write the energies more often"
 
 
@@ -334,10 +339,15 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
-        return Cause(reason, "choose another tr or td (d2rpick explore lists them)")
+        return Cause(
+            reason,
+            "choose another tr or td; d2rpick explore lists them",
+            needs_other_times=True,
+        )
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "choose another td (d2rpick explore lists them)",
+        "choose another td; d2rpick explore lists them",
+        needs_other_times=True,
     )
 
 
@@ -392,11 +402,12 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     high = best.residual_high or best.residual
     causes = []
     if best.residual > MOST_GOOD:
-        worst_text = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
+        worst_text = f", or by up to {high:.0%}" if high > _MOST_HIDDEN else ""
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "choose another td (d2rpick explore lists them)",
+                "choose another td; d2rpick explore lists them",
+                needs_other_times=True,
             )
         )
     elif high > _MOST_HIDDEN:

@@ -80,18 +80,21 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         advice = (
             ""
             if situation.flight.unknown_load
-            else "any tr in this interval is right; "
+            else ", so every tr in this interval is suitable"
         )
         yield Caution(
-            "at-rest", f"{text}: {advice}the earliest keeps the parts rigid for longest"
+            "at-rest",
+            f"{text}{advice}; the earliest keeps the parts rigid for longest",
         )
         return
     if situation.energy_td <= 0:
-        text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
-        yield Caution(
-            "no-energy",
-            f"{text}; it must be above 0 to be matched at tr; choose another td",
-        )
+        if not situation.history.energy.any():
+            text = "the energy is 0 in all states; it must be above 0"
+            cure = "choose the column with the internal energy, as `energy`"
+        else:
+            text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}; it must be above 0"
+            cure = "choose another td"
+        yield Caution("no-energy", f"{text} to be matched at tr; {cure}")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g},"
         yield Caution("poor-td", f"{lost} and no tr can keep it; choose another td")
@@ -112,10 +115,13 @@ def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        text = f"the fastest vibration in the energy has {states:.2g} states per period"
+        text = f"the fastest line of the energy has {states:.2g} states per period"
+        strong = situation.evidence.states_per_strong_period
+        if strong is not None and strong > states:
+            text += f", the fastest strong line {strong:.2g}; the verdict rests on the strong lines"
         yield Caution(
             "coarse-record",
-            f"{text}; a faster one would not be seen; write the energies more often",
+            f"{text}; a faster vibration would not be seen; write the energies more often",
         )
     if vibration.estimated:
         yield Caution(
@@ -153,13 +159,13 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    elif td <= earliest:
+    elif td <= earliest and not flight.refusal:  # the refusal says it already
         yield Caution(
             "td-in-load",
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
     yield from _warn_about_grazing(situation)
-    if td > situation.latest_td:
+    if td > situation.latest_td and not flight.refusal:
         yield Caution(
             "td-after-contact",
             f"td = {td:.6g} lies after {describe_end_of_flight(situation)}",

@@ -44,7 +44,9 @@ _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; the fields are the keys of the JSON output, None for unknown quantities.
+    """Measures of a switched run; None for unknown quantities.
+
+    The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
 
     ``energy_frozen`` is the energy of the switched run at td, ``energy_td`` that of the reference run.  ``rigid_from``
     and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which the energy of the
@@ -70,6 +72,7 @@ class Comparison(NamedTuple):
     rigid_to: float | None
     objections: tuple[str, ...]
     notes: tuple[str, ...]
+    min_mean: float = 0.0
 
 
 def compare_with_reference(
@@ -183,9 +186,10 @@ def compare_runs(
     if energies_before.size and _is_reported_wrong(
         energies_before[-1], energies_to_end
     ):
-        reported = f"while rigid the run reports an energy of {energies_before[-1]:.6g}, after td one of {frozen:.6g}"
+        reported = f"the solver reports an energy of {energies_before[-1]:.6g} while the parts are rigid"
         notes.append(
-            f"{reported}; some solvers report wrong energies of rigid solid elements"
+            f"{reported}; it is not used, because some solvers report wrong energies of rigid solid elements; "
+            f"right after td the energy is {frozen:.6g}"
         )
     still = _find_limit_of_change(reference, switched, tr, td)
     error = _compute_relative_distance(*momenta, td, end)
@@ -219,6 +223,7 @@ def compare_runs(
         rigid_to=rigid and rigid[1],
         objections=tuple(objections),
         notes=tuple(notes),
+        min_mean=min_mean,
     )
 
 
@@ -368,7 +373,10 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
             moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
-        cure = switched.left_beside or "; give `tr` and `td`"
+        cure = (
+            switched.left_beside
+            or "; give the run with the switching cards, or `tr` and `td`"
+        )
         raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
     first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
     times_before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
@@ -387,10 +395,7 @@ def _explain_why_no_times(
     ):
         return "both runs have the same energies, so it may be the reference run again"
     if not spans:
-        return (
-            f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid; "
-            "was it switched?"
-        )
+        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
     first, last = spans[0]
     start, end = switched.time[first], switched.time[last]
     return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"

@@ -383,8 +383,8 @@ def _mark_status(
         yield row
         if row.status == "supported" and row.locks_in and row.window:
             tr, td = row.window
-            moved = f"the window {tr:.6g} to {td:.6g} freezes vibration energy, which shifts the later landings"
-            why = f"{moved}; plan this window from a run that is switched in that one"
+            moved = f"switching from {tr:.6g} to {td:.6g} freezes vibration energy and shifts the later landings"
+            why = f"{moved}; plan this flight from a run with that switch"
 
 
 def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:

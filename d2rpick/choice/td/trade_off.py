@@ -171,8 +171,8 @@ class TradeOff:
 
     ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
     window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
-    requested td, else the one that saves most.  ``step`` is the nearest unbeaten offer with half the error of
-    ``start``, else the recommended one if its error is smaller.
+    requested td, else the one that saves most.  ``step`` is the nearest offer with half the error of
+    ``start``: an energy peak, else a Pareto-optimal td, else the recommended one if its error is smaller.
     """
 
     situation: Situation
@@ -184,6 +184,12 @@ class TradeOff:
     recommended: Offer | None = None
     start: Offer | None = None
     step: Offer | None = None
+
+    def decide_on(self, offer: Offer) -> Decision | None:
+        """Return the verdict on the pair of an offer as ``suggest`` gives it, with a better pair if there is one."""
+        if offer.recommended:
+            return self.suggestion.decision
+        return offer.decision_with_cure
 
 
 def explore_run(
@@ -299,7 +305,10 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest Pareto-optimal offer with half the error, or the recommended one if better, or None."""
+    """Return the nearest offer with half the error, or the recommended one if better, or None.
+
+    Like ``suggest``, it looks at the energy peaks first; without one it takes a Pareto-optimal offer.
+    """
     error = np.inf if start.error is None else start.error
     least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
     comparable = [
@@ -315,11 +324,13 @@ def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     halved = [
         offer
         for offer in better
-        if offer.unbeaten and (offer.error or 0.0) <= _MUCH_LESS * error
+        if (offer.error or 0.0) <= _MUCH_LESS * error
+        and (offer.rigid_time or 0.0) >= least_time
     ]
-    long_enough = [offer for offer in halved if (offer.rigid_time or 0.0) >= least_time]
-    if long_enough:
-        return min(long_enough, key=lambda offer: abs(offer.td - start.td))
+    peaks = [offer for offer in halved if offer.peak]
+    nearby = peaks or [offer for offer in halved if offer.unbeaten]
+    if nearby:
+        return min(nearby, key=lambda offer: abs(offer.td - start.td))
     return next((offer for offer in better if offer.recommended), None)
 
 

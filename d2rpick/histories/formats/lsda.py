@@ -154,7 +154,7 @@ class Lsda:
         return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Return number, start and layout of each visit to a state of a branch, shape (n, 3)."""
+        """Return the number, start and layout of each visit to a state of a branch, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:

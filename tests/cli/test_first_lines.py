@@ -1,0 +1,76 @@
+"""The first lines of the output say what to decide, and by which limit."""
+
+import pytest
+
+from d2rpick.choice.options import Limit
+from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
+from tests.command import MATSUM, ROOT, run, run_json
+
+SAMPLES = ROOT / "sample_data"
+T01 = str(SAMPLES / "rolloverT01.gz")
+SWITCHED = (
+    "verify",
+    "--no-deck",
+    "--switched",
+    str(SAMPLES / "oscillator_switched"),
+    str(SAMPLES / "oscillator"),
+)
+
+
+def join_lines(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_a_switched_run_passes_or_fails_with_its_limits_first() -> None:
+    result = run(*SWITCHED)
+    measures = run_json(*SWITCHED)["switched"]
+    ratio = measures["mean_after"] / measures["mean_after_reference"]
+    assert measures["objections"] == []
+    assert result.exit_code == 0
+    assert join_lines(result.stdout).startswith(
+        f"comparison passed: mean energy after td {ratio:.2f} times that of the reference run (limits 0.7 to 1.3), "
+        f"momentum error after td {measures['momentum_error']:.2%} (limit {MOST_MOMENTUM_ERROR:.0%}) use "
+    )
+
+
+def test_a_switched_run_fails_by_the_limit_that_was_given() -> None:
+    result = run(*SWITCHED[:2], "--min-mean-energy", "0.99", *SWITCHED[2:])
+    assert result.exit_code == 1
+    text = join_lines(result.stdout)
+    assert text.startswith("comparison failed: mean energy after td 1.08 times")
+    assert "(limits 0.99 to 1.01)" in text
+    assert "do not use" in text
+
+
+def test_parts_without_a_deck_are_unknown_and_the_deck_is_the_cure() -> None:
+    lines = run("parts", T01).stdout.splitlines()
+    assert (
+        lines[0]
+        == "make rigid  unknown: without the deck of the run no part can be judged"
+    )
+    assert lines[1] == "to improve  give the main deck with --deck"
+
+
+def test_a_run_without_an_energy_balance_has_an_unknown_health() -> None:
+    text = join_lines(run("info", MATSUM).stdout)
+    assert text.startswith("verdict use why 1 free flight")
+    assert "the health of the run is unknown" in text
+
+
+@pytest.mark.slow
+def test_the_warning_about_few_states_says_which_line_the_verdict_rests_on() -> None:
+    document = run_json("suggest", T01)
+    (text,) = (
+        warning["message"]
+        for warning in document["warnings"]
+        if warning["code"] == "coarse-record"
+    )
+    assert text.startswith(
+        "the fastest line of the energy has 2 states per period, the fastest strong line "
+    )
+    assert "the verdict rests on the strong lines" in text
+
+
+@pytest.mark.parametrize("value", [None, 0.7])
+def test_the_limit_of_the_kinetic_fraction_uses_its_term(value: float | None) -> None:
+    assert Limit("kinetic_share").explain(value, 0.5).startswith("kinetic fraction ")
