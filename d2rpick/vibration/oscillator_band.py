@@ -8,7 +8,6 @@ import numpy as np
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -16,6 +15,9 @@ if TYPE_CHECKING:
 
 # Half-width of the band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
+# Largest R^2 of a hidden mode in opposite phase that leaves the stated residual as it is.
+# With a residual of 0.25, a pair is still nearly good, so the upper bound alone tells enough.
+_HARMLESS: Final = 0.25**2
 # Effect of a hidden share that consists of harmonics of a nonlinear spring.
 # R is wrong by up to half of the product of this factor and the share, even between the peaks.
 _HARMONIC_COUNTS: Final = 8.0
@@ -27,8 +29,8 @@ def residual_band(
     """Return the residual of each tr (n,) with its lower and upper bound [-].
 
     If scatter lets the square reach below zero, the middle of the rest is stated: a peak chosen from noise is not
-    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best; if it may hold more than any
-    solver leaves, the middle between both is stated.
+    exact.  A hidden mode is in opposite phase in the worst case, and absent in the best.  If it may raise the residual
+    above 0.25, the middle of what is above is stated.
 
     Parameters
     ----------
@@ -48,12 +50,12 @@ def residual_band(
     share = measures.phase_share(mode.alpha, mode.omega)
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent
-    opposed = _count_opposed(fit, tr, td)
+    hidden = fit.hidden_share * _count_opposed(fit, tr, td)
     stated_now, low, high = measures.band_about(
-        squared, off, fit.hidden_share * opposed, fit.hidden_share * squared
+        squared, off, hidden, fit.hidden_share * squared
     )
-    # more than a solver leaves: such a mode is as likely as none, so the middle is stated
-    notable = max(fit.hidden_share - SMALLEST, 0.0) * opposed
+    # a hidden mode is as likely as none, so the middle of what it adds is stated
+    notable = np.maximum(hidden - _HARMLESS, 0.0)
     return np.sqrt(np.square(stated_now) + notable / 2), low, high
 
 

@@ -202,7 +202,10 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
         tmp_path / "ramp.csv",
         "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)),
     )
-    assert "give the end of the load as --after" in run("explore", str(ramp)).stderr
+    assert (
+        "if you know the end of the load, give it as --after"
+        in run("explore", str(ramp)).stderr
+    )
     run_result = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
     assert (run_result.exit_code, result.exit_code) == (1, 1)

@@ -79,9 +79,9 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     )  # before the end of the load
     assert "out-of-place" not in {warning["code"] for warning in document["warnings"]}
     table = chosen.text("table", DisplayOptions(limit=1))
-    assert "off by 0.00" in table
+    assert "out of place by 0.00" in table
     assert (
-        "at td if the parts become one rigid body (`deck` tells which do): engine is frozen elsewhere"
+        "at td if the parts become one rigid body (`deck` shows which do): engine is frozen at another place"
         in table
     )
     assert {
@@ -111,7 +111,9 @@ def test_verify_warns_where_it_is_large() -> None:
         for warning in verdict["warnings"]
         if warning["code"] == "out-of-place"
     ]
-    assert message.startswith("engine is frozen elsewhere than it is at td = 0.1464")
+    assert message.startswith(
+        "engine is frozen at a place where it is not at td = 0.1464"
+    )
     assert "1.4% of its path in the flight" in message
     assert message.endswith(
         "this holds if the parts become one rigid body, which `deck` tells"
@@ -132,7 +134,7 @@ def test_plan_gives_it_for_every_window() -> None:
     assert row["position_error_assumes"] == ONE_BODY
     text = join_wrapped_lines(run("plan", "-q", "--part", "1-17", locate_car()).stdout)
     assert (
-        "out of place at td if the parts become one rigid body: flight 2 by 0.0029; --deck tells which do"
+        "out of place at td if the parts become one rigid body: flight 2 by 0.0029; --deck shows which do"
         in text
     )
 
@@ -185,7 +187,7 @@ def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
         ).stdout
     )
     assert (
-        "in place at td, as far as parts tell: none moves against the others of its rigid body"
+        "in place at td, as far as the parts show: none moves relative to the others of its rigid body"
         in table
     )
 
@@ -214,7 +216,7 @@ def test_a_body_that_is_not_known_is_named(deck: str) -> None:
     ]
     assert (
         message
-        == "3 rigid bodies: how far that of parts 6, 8 is out of place is not predicted"
+        == "3 rigid bodies: the position error at td is unknown for the body of parts 6, 8"
     )
 
 
@@ -265,8 +267,8 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
         warning["code"]: warning["message"] for warning in suggestion["warnings"]
     }
     assert messages["deck-of-another-model"] == (
-        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: the deck is not used; name that of "
-        "the run"
+        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: the deck is not used; give the "
+        "deck of this run"
     )
 
 
@@ -290,7 +292,8 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
     assert best["position_error_assumes"] == ONE_BODY
     result = run("suggest", "-q", *arguments).stdout
     assert (
-        "at td if the parts become one rigid body: engine is frozen elsewhere" in result
+        "at td if the parts become one rigid body: engine is frozen at another place"
+        in result
     )
 
 
@@ -358,4 +361,6 @@ def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
         result.count("         1      PART") == 10
     )  # merged into lead part 1, with a row of its own to switch back
     run_result = run(*arguments, "--part", "1-14").stdout
-    assert "14 parts are one rigid body by the deck, led by part 1 (LRB)" in run_result
+    assert (
+        "14 parts are one rigid body in the deck, with lead part 1 (LRB)" in run_result
+    )

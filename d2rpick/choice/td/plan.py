@@ -3,7 +3,7 @@
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
 reference run supports all windows up to the first that locks in energy, including it.  Later windows are planned from
-the run switched in these windows (docs/explanation/planning.md, "Why one run does not support all windows").
+the run switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
 
 Each window that locks in energy costs another run, so a short one is left out for a longer one after it.
 """
