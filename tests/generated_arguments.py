@@ -55,6 +55,9 @@ def list_arguments(names: tuple[str, ...]) -> dict[str, tuple[str, str]]:
     """Return the type and the meaning of options as arguments, by name; None stands for the default of each."""
     types = {field.name: str(field.type) for field in fields(ChoiceOptions)}
     optional = {name: types[name].removesuffix(" | None") for name in names}
+    for name in names:
+        if list_options(ChoiceOptions)[name].is_time:
+            optional[name] = optional[name].replace("float", "float | str")
     return {
         name: (f"{optional[name]} | None", describe_argument(name)) for name in names
     }
@@ -85,7 +88,8 @@ def write_module() -> str:
     others = tuple(name for name in list_uses() if name not in of_cards)
     judging = write_class(
         "JudgingOptions(TypedDict, total=False)",
-        "How a pair is judged; times in the unit of the history.  None stands for the default.",
+        "How a pair is judged.  None stands for the default.\n\n"
+        '    Times have the unit of the history, or are texts with a unit, such as ``"64ms"``.',
         list_arguments(of_cards),
     )
     choosing = write_class(

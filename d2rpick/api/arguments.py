@@ -26,6 +26,8 @@ if TYPE_CHECKING:
         Path | Literal[False]
     )  # False means no deck, even if one is in the folder of the run
     Parts = str | int | Iterable[str | int]
+    # A number in the unit of the run, or a text with a unit, such as 64ms.
+    Time = float | str
 
 _LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut in a message
 
@@ -351,7 +353,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     return value
 
 
-def read_choosing(choosing: Choosing) -> dict[str, Any]:
+def read_choosing(choosing: Choosing | Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a request that define how to choose."""
     from d2rpick.api.choosing import Choosing as Arguments
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.deck_in_folder import find_deck_in_folder, name_deck
-from d2rpick.api.request import Request
+from d2rpick.api.request import OPTIONS, Request
+from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import (
     ArgumentError,
     Caution,
@@ -75,10 +76,14 @@ def make_request(
     weights: Weights | arguments.Path | None,
     choosing: Choosing,
 ) -> Request:
-    """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument."""
+    """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument.
+
+    Times in ``choosing`` may be texts with a unit, which are converted to the unit of the run.
+    """
     if run is not None:
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()
+    times = TimeArguments.of_run(run)
     request = Request(
         deck=None
         if deck is None or deck is False
@@ -93,7 +98,7 @@ def make_request(
         part=arguments.list_part_names("parts", parts),
         flying=arguments.list_part_names("flying", flying),
         channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
-        **arguments.read_choosing(choosing),
+        **arguments.read_choosing(times.convert_options(choosing, OPTIONS)),
     )
     return find_deck_in_folder(request)
 

@@ -24,7 +24,7 @@ from d2rpick.choice.pair.grades import GRADES
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.asked import RunQuestion
     from d2rpick.api.choosing import JudgingOptions
     from d2rpick.api.runs import Run
@@ -54,7 +54,7 @@ class CardOptions(TypedDict, total=False):
     swset: tuple[int, int] | None
     step_cap: float | None
     node: Parts | None
-    end: float | None
+    end: Time | None
     name: str | None
     contact: int | None
     wall: int | None
@@ -80,6 +80,15 @@ def list_solvers() -> Sequence[str]:
     from d2rpick.deck.printing import SOLVERS  # imported here to start faster
 
     return tuple(SOLVERS)
+
+
+def explain_unknown_solver(name: str) -> str:
+    """Return the message for a name that is no solver, with the most similar name of one."""
+    from d2rpick.histories.names import suggest_name
+
+    solvers = list_solvers()
+    near = suggest_name(name, solvers)
+    return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
 
 
 @dataclass(eq=False, repr=False)
@@ -373,7 +382,7 @@ def _list_verdict_cautions(verdict: PairVerdict) -> Iterator[Caution]:
 
 
 def card(
-    windows: Iterable[tuple[float, float]],
+    windows: Iterable[tuple[Time, Time]],
     *,
     run: Run | None = None,
     parts: Parts | None = None,
@@ -410,18 +419,19 @@ def card(
     >>> d2.card([(0.02, 0.09), (0.2, 0.3)], parts=11).card.windows
     ((0.02, 0.09), (0.2, 0.3))
     """
-    from d2rpick.api import arguments
     from d2rpick.api.asked import make_request
+    from d2rpick.api.times import TimeArguments
 
-    times = arguments.check_windows("windows", windows)
-    arguments_of_card: dict[str, Any] = dict(options)
+    times = TimeArguments.of_run(run)
+    times_of_windows = times.check_windows("windows", windows)
+    arguments_of_card = times.convert_options(options, list_options(Cards))
     judging: Any = {
         name: arguments_of_card.pop(name)
         for name in CHOOSING_FOR_CARDS
         if name in arguments_of_card
     }
     return print_card(
-        times,
+        times_of_windows,
         run,
         make_request(run, parts, None, None, None, judging),
         Cards.of(arguments_of_card),  # type: ignore[arg-type]

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 
 class JudgingOptions(TypedDict, total=False):
-    """How a pair is judged; times in the unit of the history.  None stands for the default.
+    """How a pair is judged.  None stands for the default.
+
+    Times have the unit of the history, or are texts with a unit, such as ``"64ms"``.
 
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td is earlier by the margin (default: found from the record).  ``margin``: time kept free after the load
@@ -23,9 +25,9 @@ class JudgingOptions(TypedDict, total=False):
     only ``td`` is given).
     """
 
-    after: float | None
-    landing: float | None
-    margin: float | None
+    after: float | str | None
+    landing: float | str | None
+    margin: float | str | None
     tolerance: float | None
     max_kinetic_share: float | None
     max_residual: float | None
@@ -44,7 +46,7 @@ class Choosing(JudgingOptions, total=False):
     oscillator (default: True).
     """
 
-    fit_window: tuple[float, float] | None
+    fit_window: tuple[float | str, float | str] | None
     strict: bool | None
     keep_vibration: bool | None
     cost_share: float | None

@@ -9,6 +9,7 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, Paged, build_frame, write_page
 from d2rpick.api.asked import make_request, read_cost_model
 from d2rpick.api.deck_in_folder import name_deck
+from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice.parts import calibration, sets_of_parts
 from d2rpick.choice.parts.cost import Weights, format_weights_as_toml
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
@@ -78,8 +79,8 @@ def parts(
     deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     given: Parts | None = None,
-    tr: float | None = None,
-    td: float | None = None,
+    tr: Time | None = None,
+    td: Time | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
     """Determine which parts of a run may be switched and the savings of sets, as ``d2rpick parts`` does.
@@ -95,7 +96,7 @@ def parts(
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     given : number, title or several, optional
         A set to be compared too.
-    tr, td : float, optional
+    tr, td : float or text, optional
         The window to compare in, or its end alone [time].  Default: at the end of the longest flight.
     **choosing
         As for `suggest`.
@@ -118,11 +119,9 @@ def parts(
     ['box', 'step']
     """
     request = make_request(run, given, None, deck, weights, choosing)
+    times = TimeArguments.of_run(run)
     return compare_parts(
-        run,
-        request,
-        arguments.check_optional_number("tr", tr),
-        arguments.check_optional_number("td", td),
+        run, request, times.check_time("tr", tr), times.check_time("td", td)
     )
 
 

@@ -10,6 +10,7 @@ from d2rpick.api.answer import RunAnswer, build_frame
 from d2rpick.api.asked import RunQuestion, ask_run, make_request
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judge_and_print
 from d2rpick.api.request import check_window
+from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.choice.td import plan as planning, trade_off
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.checking import Findings
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
@@ -89,9 +90,9 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
 def explore(
     run: Run,
-    td: float | None = None,
+    td: Time | None = None,
     *,
-    td_window: tuple[float, float] | None = None,
+    td_window: tuple[Time, Time] | None = None,
     steps: int | None = _STEPS,
     parts: Parts | None = None,
     flying: Parts | None = None,
@@ -105,7 +106,7 @@ def explore(
     ----------
     run : Run
         As `read` gives it, without switching.
-    td : float, optional
+    td : float or text, optional
         A td to explore too, with which the others are compared [time].
     td_window : (float, float), optional
         Range of td [time].  Default: the longest flight; if there is none but td is given, the record.
@@ -133,8 +134,9 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    wanted = arguments.check_optional_number("td", td)
-    window = arguments.check_time_window("td_window", td_window)
+    times = TimeArguments.of_run(run)
+    wanted = times.check_time("td", td)
+    window = times.check_window("td_window", td_window)
     count = arguments.check_whole_number("steps", _STEPS if steps is None else steps, 1)
     question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
     return explore_for_question(question, wanted, window, count)
@@ -241,8 +243,8 @@ def plan(
     flying: Parts | None = None,
     deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
-    min_rigid: float | None = None,
-    done: Iterable[tuple[float, float]] | None = (),
+    min_rigid: Time | None = None,
+    done: Iterable[tuple[Time, Time]] | None = (),
     before: Run | None = None,
     **choosing: Unpack[Choosing],
 ) -> Plan:
@@ -254,7 +256,7 @@ def plan(
         As `read` gives it: without switching, or switched in the windows that are ``done``.
     parts, flying, deck, weights, **choosing
         As for `suggest`.
-    min_rigid : float, optional
+    min_rigid : float or text, optional
         Leave shorter windows out [time].  Default: 5 % of the record, and a window that locks in energy before one more
         than twice as long.
     done : pairs of float
@@ -280,8 +282,9 @@ def plan(
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
     [(0.143, 0.345)]
     """
-    shortest = arguments.check_optional_number("min_rigid", min_rigid, NOT_NEGATIVE)
-    windows = arguments.check_windows("done", done)
+    times = TimeArguments.of_run(run)
+    shortest = times.check_time("min_rigid", min_rigid, NOT_NEGATIVE)
+    windows = times.check_windows("done", done)
     if before is not None:
         arguments.check_run("before", before)
     question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))

@@ -79,7 +79,7 @@ class ReadingOptions:
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
-        "Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
+        "Energy history of the reference run to judge by: file, folder or glob; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = make_option(
@@ -307,15 +307,16 @@ def _write_word(value: Any) -> str:
 
 def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     """Read ``QUANTITY=NAME``; raise ArgumentError for an unknown quantity, or one that is given twice."""
-    from d2rpick.histories.names import QUANTITIES
+    from d2rpick.histories.names import QUANTITIES, suggest_name
 
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
         if quantity not in QUANTITIES or not name:
-            quantities = ", ".join(QUANTITIES)
+            near = suggest_name(quantity, tuple(QUANTITIES))
+            quantities = near or f", with one of {', '.join(QUANTITIES)}"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {quantities}"
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected{quantities}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")
@@ -335,7 +336,9 @@ def choose_time_or_window(
 ) -> float | tuple[float, float] | None:
     """Return the given td or the window for it; raise ArgumentError for both."""
     if td is not None and window is not None:
-        raise ArgumentError("`td` and `td_window` exclude each other")
+        raise ArgumentError(
+            "`td` and `td_window` exclude each other: give `td` to keep that time, `td_window` to have it chosen"
+        )
     check_window("td_window", window)
     return window if td is None else td
 

@@ -17,7 +17,8 @@ import numpy as np
 from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, build_frame
 from d2rpick.api.asked import make_request
-from d2rpick.api.request import Request, choose_time_or_window
+from d2rpick.api.request import OPTIONS, Request, choose_time_or_window
+from d2rpick.api.times import TimeArguments, find_common_unit
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import add_checksum, append_as_a_whole, parse_record
 from d2rpick.base.workers import Farm, choose_farm
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
@@ -71,9 +72,9 @@ class Study(Paged, core.StudyOfRuns):
 
 def study(
     runs: Iterable[arguments.Path],
-    td: float | None = None,
+    td: Time | None = None,
     *,
-    td_window: tuple[float, float] | None = None,
+    td_window: tuple[Time, Time] | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
     time: str | int | None = None,
@@ -89,8 +90,8 @@ def study(
     ----------
     runs : several paths
         Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
-    td : float, optional
-        When the parts are switched back [time].
+    td : float or text, optional
+        When the parts are switched back [time]; a text such as ``"64ms"`` if all runs name the same unit.
     td_window : (float, float), optional
         Instead of ``td``: the range in which each run chooses its own td [time]; without both, its longest flight.
     parts, flying, **choosing
@@ -119,19 +120,23 @@ def study(
     """
     from d2rpick.api.runs import check_format, make_selection
 
-    td_or_window = choose_time_or_window(
-        arguments.check_optional_number("td", td),
-        arguments.check_time_window("td_window", td_window),
-    )
-    processes = arguments.check_whole_number("jobs", 1 if jobs is None else jobs, 1)
+    chosen = make_selection(time, energy, channels)
+    file_format = check_format(input_format)
     names = find_runs(
         arguments.list_paths("runs", [runs] if isinstance(runs, str) else runs)
     )
-    request = make_request(None, parts, flying, None, None, choosing)
-    chosen = make_selection(time, energy, channels)
+    times = TimeArguments(
+        lambda: find_common_unit([[name] for name in names], chosen, file_format)
+    )
+    td_or_window = choose_time_or_window(
+        times.check_time("td", td), times.check_window("td_window", td_window)
+    )
+    processes = arguments.check_whole_number("jobs", 1 if jobs is None else jobs, 1)
+    choosing_in_unit: Any = times.convert_options(choosing, OPTIONS)
+    request = make_request(None, parts, flying, None, None, choosing_in_unit)
     request = replace(
         request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(pair) for pair in chosen.channels),
-        input_format=check_format(input_format),
+        input_format=file_format,
     )  # fmt: skip
     question = make_question(request, td_or_window, curve=True)
     with choose_farm(min(processes, len(names)), "d2rpick.choice.runs.study") as farm:

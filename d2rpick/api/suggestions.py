@@ -16,6 +16,7 @@ from d2rpick.api.cards import (
     judge_and_print as card_judged,
 )
 from d2rpick.api.request import MIN_MEAN_ENERGY, choose_time_or_window
+from d2rpick.api.times import TimeArguments
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import FRACTION
 from d2rpick.choice import answers
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.api.choosing import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.choice.pair.candidates import Pair
@@ -165,9 +166,9 @@ class Verdict(RunAnswer, answers.PairVerdict):
 
 def suggest(
     run: Run,
-    td: float | None = None,
+    td: Time | None = None,
     *,
-    td_window: tuple[float, float] | None = None,
+    td_window: tuple[Time, Time] | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
     deck: arguments.Deck | None = None,
@@ -180,8 +181,8 @@ def suggest(
     ----------
     run : Run
         As `read` gives it, without switching.
-    td : float
-        When the parts are switched back [time].
+    td : float or text
+        When the parts are switched back [time]; a text with a unit, such as ``"64ms"``, if the run names its own.
     td_window : (float, float)
         Instead of ``td``: the range in which td is chosen [time]; without both, the longest flight.
     parts : number, title or several, optional
@@ -217,9 +218,10 @@ def suggest(
     >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
     '0.013587 0.068753'
     """
+    times = TimeArguments.of_run(run)
     wanted = choose_time_or_window(
-        arguments.check_optional_number("td", td),
-        arguments.check_time_window("td_window", td_window),
+        times.check_time("td", td),
+        times.check_window("td_window", td_window),
     )
     return suggest_for_question(
         ask_run(run, make_request(run, parts, flying, deck, weights, choosing)), wanted
@@ -250,8 +252,8 @@ def _read(pair: Pair) -> tuple[float, float]:
 
 def verify(
     run: Run,
-    tr: float | None = None,
-    td: float | None = None,
+    tr: Time | None = None,
+    td: Time | None = None,
     *,
     switched: Run | None = None,
     min_mean_energy: float | None = MIN_MEAN_ENERGY,
@@ -267,8 +269,9 @@ def verify(
     ----------
     run : Run
         As `read` gives it, without switching.
-    tr, td : float
-        Switch times [time]; with ``switched`` they are read off that run where they are not given.
+    tr, td : float or text
+        Switch times [time], or texts such as ``"64ms"``; with ``switched`` they are read off that run where they are
+        not given.
     switched : Run, optional
         A finished run with these switch times, to be compared with ``run``.
     min_mean_energy : float
@@ -294,10 +297,8 @@ def verify(
     >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
     True
     """
-    pair = (
-        arguments.check_optional_number("tr", tr),
-        arguments.check_optional_number("td", td),
-    )
+    times = TimeArguments.of_run(run)
+    pair = times.check_time("tr", tr), times.check_time("td", td)
     min_ratio = arguments.check_number(
         "min_mean_energy",
         MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,

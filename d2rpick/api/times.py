@@ -1,16 +1,100 @@
-"""Convert times typed with a unit to numbers in the unit of the run."""
+"""Convert times with a unit, such as 64ms, to numbers in the unit of a run; check arguments that are times."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import ArgumentError
+from d2rpick.api import arguments
+from d2rpick.base.errors import ArgumentError, list_names
+from d2rpick.base.options import TIME
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import convert_to_unit, parse_seconds
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from d2rpick.api.runs import Run
+    from d2rpick.base.options import Option
+    from d2rpick.base.ranges import Number
     from d2rpick.histories.names import Selection
+
+
+class TimeUnit(NamedTuple):
+    """The unit of the times of a run, empty if it is unknown, and the source that should name it."""
+
+    name: str
+    source: str
+
+
+_WITHOUT_RUN: Final = TimeUnit("", "the arguments, which contain no run")
+
+
+class TimeArguments:
+    """Check arguments that are times: numbers in the unit of a run, or texts with a unit, such as "64ms".
+
+    ``find_unit`` returns the unit to which texts are converted.  It is called only if there is such a text, since it
+    may have to open a run.
+
+    Examples
+    --------
+    >>> times = TimeArguments(lambda: TimeUnit("s", "energy.csv"))
+    >>> times.check_time("td", "64ms"), times.check_window("td_window", ("60ms", 0.07))
+    (0.064, (0.06, 0.07))
+    """
+
+    def __init__(self, find_unit: Callable[[], TimeUnit]) -> None:
+        self._find_unit = find_unit
+
+    @classmethod
+    def of_run(cls, run: Run | None) -> TimeArguments:
+        """Return a check that converts to the unit of a run."""
+        return cls(lambda: find_unit_of_run(run))
+
+    def check_time(
+        self, name: str, value: object, limits: Number = TIME
+    ) -> float | None:
+        """Return a finite time within its limits, or None if none is given."""
+        return arguments.check_optional_number(name, self.convert(name, value), limits)
+
+    def check_window(self, name: str, value: object) -> tuple[float, float] | None:
+        """Return a window of time, the lower time first, or None if none is given."""
+        return arguments.check_time_window(name, self.convert(name, value))
+
+    def check_windows(self, name: str, value: object) -> list[tuple[float, float]]:
+        """Return windows of time, none for None."""
+        if isinstance(value, Iterator):
+            value = list(value)
+        return arguments.check_windows(name, self.convert(name, value))
+
+    def convert_options(
+        self, values: Mapping[str, Any], options: Mapping[str, Option]
+    ) -> dict[str, Any]:
+        """Return the values of options by name, with those converted that are times."""
+        return {
+            name: self.convert(name, value)
+            if name in options and options[name].is_time
+            else value
+            for name, value in values.items()
+        }
+
+    def convert(self, name: str, value: object) -> object:
+        """Return a value with each text that is a time with a unit replaced by a number, also in lists and tuples.
+
+        Raises
+        ------
+        ArgumentError
+            If the unit of the run is not known.
+        """
+        if isinstance(value, list | tuple):
+            return [self.convert(name, single) for single in value]
+        if not (isinstance(value, str) and is_time_with_unit(value)):
+            return value
+        unit = self._find_unit()
+        try:
+            return convert_typed_time(value, unit.name, unit.source)
+        except ArgumentError as error:
+            raise ArgumentError(f"{name}: {error}") from None
 
 
 def is_time_with_unit(text: str) -> bool:
@@ -24,10 +108,19 @@ def is_time_with_unit(text: str) -> bool:
     return parse_seconds(text) is not None
 
 
-def find_time_unit(
-    names: Sequence[str], selection: Selection, input_format: str
-) -> str:
-    """Return the unit of time that the files of a run name; empty if they name none, or different ones.
+def find_unit_of_run(run: Run | None) -> TimeUnit:
+    """Return the unit of time that the files of an opened run name; empty if they name none, or different ones."""
+    if run is None:
+        return _WITHOUT_RUN
+    arguments.check_run("run", run)
+    units = {database.time_unit for database in run.files.databases}
+    return TimeUnit(_choose_only_unit(units), list_names(run.sources))
+
+
+def find_common_unit(
+    runs: Sequence[Sequence[str]], selection: Selection, input_format: str
+) -> TimeUnit:
+    """Return the unit of time that all runs name, each given by its files; empty if they name none, or different ones.
 
     Raises
     ------
@@ -36,9 +129,17 @@ def find_time_unit(
     """
     from d2rpick.histories.opening import open_run
 
-    databases = open_run(names, selection, input_format).databases
-    units = {database.time_unit for database in databases}
-    return units.pop() if len(units) == 1 else ""
+    opened_runs = [open_run(names, selection, input_format) for names in runs]
+    units = {
+        database.time_unit for opened in opened_runs for database in opened.databases
+    }
+    source = list_names([name for names in runs for name in names])
+    return TimeUnit(_choose_only_unit(units), source)
+
+
+def _choose_only_unit(units: set[str]) -> str:
+    """Return the unit if there is only one, otherwise an empty text."""
+    return next(iter(units)) if len(units) == 1 else ""
 
 
 def convert_typed_time(text: str, unit: str, source: str) -> float:

@@ -38,6 +38,11 @@ class Option(NamedTuple):
     instead_of: tuple[str, ...] = ()
     short: tuple[str, ...] = ()
 
+    @property
+    def is_time(self) -> bool:
+        """True if its value is a time of the run, or a window of time."""
+        return self.metavar in ("T", "LO HI")
+
 
 def make_option(
     text: str,

@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import ConfigurationError
+from d2rpick.base.errors import ConfigurationError, list_names
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ _OF_REPOSITORIES: Final = (".git", ".hg")  # present in the root of a repository
 RULE_KEYS: Final = ("select", "ignore", "severity")
 # Characters that may surround the pieces of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
+_MOST_KEYS_NAMED: Final = 8
 _LONGEST_VALUE: Final = 60  # characters of a value in a message
 
 
@@ -120,18 +121,46 @@ def format_toml_value(value: object) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 
+def locate_setting(path: str, key: str, table: str = "") -> str:
+    """Return a settings file and the line that sets ``key`` in ``table``, ``path:line``; the file alone if unknown.
+
+    A ``table`` named "" is the top of the settings, in which a key may be the head of a table.
+    """
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            lines = file.read().splitlines()
+    except (OSError, ValueError):
+        return path
+    current_table = ""
+    for number, line in enumerate(lines, start=1):
+        text = line.translate(_UNIMPORTANT).partition("#")[0]
+        if text.startswith("["):
+            head = text.strip("[]")
+            current_table = head.removeprefix("tool.d2rpick").removeprefix(".")
+            is_wanted = not table and current_table == key
+        else:
+            is_wanted = current_table == table and text.startswith(f"{key}=")
+        if is_wanted:
+            return f"{path}:{number}"
+    return path
+
+
 def refuse_unknown_settings(
-    names: Iterable[str], known: Collection[str], source: str
+    names: Iterable[str], known: Collection[str], source: str, table: str = ""
 ) -> None:
-    """Raise ConfigurationError, with the most similar key, for the first key that is not ``known``."""
+    """Raise ConfigurationError, with its line and the most similar key, for the first key that is not ``known``."""
     for name in names:
         if name not in known:
             import difflib  # imported here: it is rarely needed
 
             near = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            names_of_keys = list_names(tuple(known), most=_MOST_KEYS_NAMED)
+            place = locate_setting(source, name, table)
+            named_table = f" {table}:" if table else ""
             raise ConfigurationError(
-                f"{source}: unknown key {name!r}, one of {', '.join(known)} was expected{hint}"
+                f"{place}:{named_table} unknown key {name!r}{hint}, one of {names_of_keys} was expected; "
+                "--show-settings lists those of a command"
             )
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-# Names of quantities whose keys differ from their terms.
-_NAMES: Final = {"kinetic_share": "kinetic fraction"}
+# Names of quantities in messages that differ from their keys.
+_QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
@@ -61,7 +61,7 @@ class Limit(NamedTuple):
         # imported here: a start needs no message
         from d2rpick.histories.digits import format_beyond_limit
 
-        name = _NAMES.get(self.quantity, self.quantity.replace("_", " "))
+        name = _QUANTITIES.get(self.quantity, self.quantity.replace("_", " "))
         if value is None:
             bound = "at least" if self.is_lower else "at most"
             return f"{name} unknown, {bound} {limit:g} was asked for"

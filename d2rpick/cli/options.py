@@ -62,8 +62,6 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": ADVANCED,
 }
-# Placeholders of options that are times of the run.
-_TIMES: Final = ("T", "LO HI")
 # Options that write files, which would already exist if the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
@@ -287,7 +285,7 @@ def make_click_option(
         about["is_flag"] = True
     else:
         kind = choose_click_type(entry.kind)
-        if entry.metavar in _TIMES:
+        if entry.is_time:
             kind = TimeType(kind.limits)
         about |= {"type": kind, "nargs": 2 if entry.pair else 1, "multiple": entry.many}
     about |= {"instead_of": entry.instead_of} | arguments

@@ -14,7 +14,12 @@ from d2rpick.api.request import (
     Request,
     choose_time_or_window,
 )
-from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
+from d2rpick.base.errors import (
+    INTERNAL_ERROR,
+    D2RPickError,
+    FormatError,
+    list_names,
+)
 from d2rpick.base.options import UNLIMITED, Option
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
@@ -154,11 +159,20 @@ def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
         raise click.UsageError(
             f"no runs; {where}give their names, or a list with --from"
         )
+    if all(_is_unmatched_pattern(source) for source in sources):
+        raise FormatError(
+            f"{list_names(sources)}: no file matches; check the name and the folder"
+        )
     if "-" in sources:
         raise click.UsageError(
             "- cannot be a run: standard input cannot be passed to other processes"
         )
     return sources
+
+
+def _is_unmatched_pattern(name: str) -> bool:
+    """Return True for a name with wildcards that no file or folder has or matches."""
+    return any(sign in name for sign in "*?[") and not os.path.lexists(name)
 
 
 def _read_list(name: str) -> Iterator[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from d2rpick.base.errors import ArgumentError, list_names
+from d2rpick.base.errors import ArgumentError
 from d2rpick.cli.values import NumberType
 
 if TYPE_CHECKING:
@@ -93,13 +93,11 @@ def _find_unit(ctx: click.Context) -> tuple[str, str]:
         return "", "the command line, which names no run"
     if any("-" in names for names in runs):
         return "", "standard input"
-    from d2rpick.api.times import find_time_unit
+    from d2rpick.api.times import find_common_unit
 
     request = _make_reading_request(ctx)
     selection = request.selection(parts=False)
-    units = {find_time_unit(names, selection, request.input_format) for names in runs}
-    source = list_names([name for names in runs for name in names])
-    return (units.pop() if len(units) == 1 else ""), source
+    return find_common_unit(runs, selection, request.input_format)
 
 
 def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:

@@ -10,12 +10,22 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
-from d2rpick.api.cards import SETTINGS, Cards, list_solvers
+from d2rpick.api.cards import (
+    SETTINGS,
+    Cards,
+    explain_unknown_solver,
+    list_solvers,
+)
 from d2rpick.api.request import JUDGING, write_option
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.options import UNLIMITED, list_options
 from d2rpick.base.ranges import Number
-from d2rpick.base.settings import RULE_KEYS, format_toml_value, refuse_unknown_settings
+from d2rpick.base.settings import (
+    RULE_KEYS,
+    format_toml_value,
+    locate_setting,
+    refuse_unknown_settings,
+)
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -28,6 +38,7 @@ else:
     FloatType = click.ParamType  # generic from click 8.4 on
 
 CARDS: Final = tuple(list_options(Cards))
+_PAIR: Final = 2  # values of an option that is a pair
 # Options that apply only together with another one: settings are for all commands, also those that lack these.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
@@ -57,6 +68,8 @@ class NumberType(FloatType):
             )
 
             hint = suggest_decimal_point(value) or suggest_without_unit(value)
+            if param and param.nargs == _PAIR and not hint:
+                hint = ": two numbers were expected"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
@@ -204,11 +217,7 @@ class SolverName(CompletedText):
     ) -> str:
         """Return the name, or fail with the allowed names."""
         if value not in list_solvers():
-            self.fail(
-                f"{value!r} was found, one of {', '.join(list_solvers())} was expected",
-                param,
-                ctx,
-            )
+            self.fail(explain_unknown_solver(value), param, ctx)
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
@@ -302,10 +311,13 @@ def _list_given_settings(
         if isinstance(entry, click.Option)
     }
     own_table = tables.get(command.name or "", {})
-    refuse_unknown_settings(own_table, options, f"{source}: {command.name}")
+    own_name = command.name or ""
+    refuse_unknown_settings(own_table, options, source, own_name)
     for name, value in {**shared, **own_table}.items():
         if name in options:
-            yield options[name], value, f"{source}: {name}"
+            table_of_key = own_name if name in own_table else ""
+            place = locate_setting(source, name, table_of_key)
+            yield options[name], value, f"{place}: {name}"
 
 
 def _read_value(

@@ -18,7 +18,12 @@ from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.contact_forces import join_contact_forces
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
-from d2rpick.histories.names import Part, mark_namesakes, resolve_name
+from d2rpick.histories.names import (
+    Part,
+    find_energy_unit,
+    mark_namesakes,
+    resolve_name,
+)
 from d2rpick.histories.samples import find_newest_states, find_window
 
 if TYPE_CHECKING:
@@ -141,6 +146,10 @@ class Database:
         """Return the column that the user selects by name or, in tables, by number; FormatError lists the columns."""
         return resolve_name(wanted, self.channels, self.source)
 
+    def find_energy_unit(self, channel: str) -> str:
+        """Return the unit of energy that the name of a column contains; empty without one."""
+        return find_energy_unit(channel)
+
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
         """Return the precision of the times and of these channels, or of the parts without channels."""
         return Precision(self.digits), Precision(self.digits)
@@ -262,6 +271,10 @@ class Legs:
     def find(self, wanted: str) -> str:
         """Return the column that the user selects."""
         return self._legs[0].find(wanted)
+
+    def find_energy_unit(self, channel: str) -> str:
+        """Return the unit of energy that the name of a column contains."""
+        return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
         """Return a column of the whole model."""

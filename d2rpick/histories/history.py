@@ -261,9 +261,9 @@ class History:
     energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
     energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
     ends within a state; ``notes`` are for the user; ``files`` were read. If the energy is a sum, ``part_names`` (k,)
-    and ``part_energies`` (n, k) are its terms that are not always zero. ``time_unit`` is empty unless the file names
-    it. ``evidence`` shows when parts fly freely; the evidence of a file is read at the first request.
-    ``surroundings`` are the forces from outside.
+    and ``part_energies`` (n, k) are its terms that are not always zero. ``time_unit`` and ``energy_unit`` are empty
+    unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a file is read at the first
+    request. ``surroundings`` are the forces from outside.
     """
 
     time: Samples
@@ -276,6 +276,7 @@ class History:
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
+    energy_unit: str = ""
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
     evidence: Given = NO_EVIDENCE

@@ -87,6 +87,9 @@ _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
 # A number or range of part ids; a text with more digits is a title.
+_SHORTEST_BEGINNING: Final = (
+    3  # letters from which the beginning of a name identifies it
+)
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
 
 
@@ -109,6 +112,28 @@ def find_unit(name: str) -> str:
         return two_words[1]
     tail = _TAIL.match(name)
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
+
+
+def find_energy_unit(name: str) -> str:
+    """Return the unit at the end of the name of an energy; empty if it has none, or one that is no energy.
+
+    Examples
+    --------
+    >>> [find_energy_unit(name) for name in ("Internal energy [mJ]", "IE_kJ", "energy_s", "ratio (-)")]
+    ['mJ', 'kJ', '', '']
+    """
+    return check_energy_unit(find_unit(name))
+
+
+def check_energy_unit(unit: str) -> str:
+    """Return a unit as it is written, or an empty text if it is no unit of energy.
+
+    Examples
+    --------
+    >>> check_energy_unit("N*mm"), check_energy_unit("ms")
+    ('N*mm', '')
+    """
+    return unit if unit.casefold().replace(" ", "*") in _ENERGY_UNITS else ""
 
 
 def remove_unit(name: str) -> str:
@@ -192,11 +217,23 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity."""
+    """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity.
+
+    Without a similar name, the only one that begins with the wanted text is proposed.
+
+    Examples
+    --------
+    >>> suggest_name("kinetic", ["kinetic_energy", "x_momentum"])
+    " (did you mean 'kinetic_energy'?)"
+    """
     import difflib
 
     folded = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(wanted.casefold(), folded, n=1, cutoff=likeness)
+    beginning = wanted.casefold()
+    close = difflib.get_close_matches(beginning, folded, n=1, cutoff=likeness)
+    if not close and len(beginning) >= _SHORTEST_BEGINNING:
+        longer_names = [name for name in folded if name.startswith(beginning)]
+        close = longer_names if len(longer_names) == 1 else []
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 

@@ -466,9 +466,16 @@ class OpenedRun:
             time_precision=time_precision,
             energy_precision=energy_precision,
             time_unit=database.time_unit,
+            energy_unit=_find_common_energy_unit(database, names),
             complete=all(legs.complete for legs in self.databases),
             notes=(*self.notes, *notes),
         )
+
+
+def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
+    """Return the unit of energy of all these channels; empty if one has none, or they differ."""
+    units = {database.find_energy_unit(name) for name in names}
+    return units.pop() if len(units) == 1 else ""
 
 
 class _Written(Given):

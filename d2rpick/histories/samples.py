@@ -128,10 +128,12 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
         )
     if back:
         steps = "once" if back == 1 else f"{back} times"
+        first = int(np.flatnonzero(step < 0)[0])
+        place = f"{'' if back == 1 else 'first '}from {time[first]:.6g} to {time[first + 1]:.6g}"
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(
-            f"time steps back {steps} (restart); the newer restart segment is used where they "
+            f"time steps back {steps}, {place} (restart); the newer restart segment is used where they "
             f"overlap, {dropped} dropped"
         )
     return keep, tuple(notes)

@@ -42,7 +42,7 @@ def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
         tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",
         f"fraction of a time step spent on elements  {weights.element_share:.3f}",
         f"cost per node of a rigid body              {weights.rigid_node:.3g} us",
-        f"misfit                                     {calibration.misfit:.1%} of the CPU time of a leg", "",
+        f"misfit                                     {calibration.misfit:.1%} of the CPU time of an engine run", "",
         tables.as_text(LEG_HEAD, _list_leg_rows(calibration), display.width),
     ]  # fmt: skip
     return "\n".join(lines)
@@ -82,7 +82,7 @@ def _list_weight_rows(calibration: FittedWeights) -> list[list[tables.Cell]]:
             name,
             f"{weight:.3g}",
             f"{MEASURED[name]:.3g}",
-            "these legs" if name in calibration.told else "ratio as measured",
+            "these engine runs" if name in calibration.told else "ratio as measured",
         ]
         for name, weight in calibration.weights.per_element.items()
     ]

@@ -96,7 +96,7 @@
   const kinds = {
     energy: () => ({
       height: 320, scales: { x: { time: false, range: flight.view }, y: { distr: flight.log ? 3 : 1, range: flight.heights } },
-      series: [{}, line("ink")], axes: [axis(flight.time, { values: times }), axis("internal energy", { size: 62 })],
+      series: [{}, line("ink")], axes: [axis(flight.time, { values: times }), axis(flight.energy_label, { size: 62 })],
       data: flight.energy,
     }),
     whole: () => ({
@@ -108,7 +108,7 @@
     motion: () => ({
       height: 220, scales: { x: { time: false, range: flight.view }, y: { range: (_, low, high) => padded(low, high) } },
       series: [{}, line("ink"), line("switched")],
-      axes: [axis(flight.time, { values: times }), axis("deformation [√energy]", { size: 62 })], data: motion(),
+      axes: [axis(flight.time, { values: times }), axis(flight.deformation_label, { size: 62 })], data: motion(),
     }),
     trade: () => ({
       height: 320, scales: { x: { time: false, range: (_, low, high) => padded(low, high) }, y: { range: (_, low, high) => [0, 1.08 * (high || 1)] } },

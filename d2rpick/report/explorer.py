@@ -17,6 +17,7 @@ from d2rpick.choice.pair.decision import format_bounds
 from d2rpick.histories.samples import draw_outline
 from d2rpick.report.decision import format_saved_share
 from d2rpick.report.page import Explorer, Markup, join, make_element, read_resource
+from d2rpick.report.situation import label_deformation, label_energy
 from d2rpick.report.suggestion import describe_acceptable_windows
 from d2rpick.report.tables import (
     fill_table,
@@ -180,6 +181,8 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time (unit of the run)",
+        "energy_label": label_energy(history.energy_unit),
+        "deformation_label": label_deformation(history.energy_unit),
         "error": _name_error(trade_off.offers),
         "saved": _name_saving(trade_off.offers),
         "view": [view.start, view.end],

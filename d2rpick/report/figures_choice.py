@@ -29,7 +29,7 @@ from d2rpick.report.figures import (
     mark_span,
 )
 from d2rpick.report.figures_modal import draw_halfway, draw_residuals
-from d2rpick.report.situation import name_energy
+from d2rpick.report.situation import label_deformation, label_energy, name_energy
 from d2rpick.report.study import shorten_names
 from d2rpick.report.view import (
     ReplayedMotion,
@@ -181,7 +181,7 @@ def _draw(
         draw_halfway(panels[0], situation, tr)
         draw_residuals(panels[1], situation)
     elif motion:
-        _draw_motion(panels[1], motion)
+        _draw_motion(panels[1], motion, situation.history.energy_unit)
     if better:
         _draw_better(panels, situation.at(better.td), better.tr)
     panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
@@ -248,7 +248,7 @@ def _draw_energy(
                 zorder=3,
                 label=label,
             )
-    axes.set_ylabel("internal energy")
+    axes.set_ylabel(label_energy(history.energy_unit))
 
 
 def _draw_better(
@@ -266,13 +266,13 @@ def _draw_better(
         line.set(color=BETTER, linestyle="-.", linewidth=0.8, label="better pair")
 
 
-def _draw_motion(axes: Axes, motion: ReplayedMotion) -> None:
+def _draw_motion(axes: Axes, motion: ReplayedMotion, energy_unit: str) -> None:
     for values, colour, name in (
         (motion.reference, REFERENCE, "without switching"),
         (motion.switched, SWITCHED, "switched"),
     ):
         axes.plot(motion.time, values, color=colour, linewidth=1, label=name)
-    axes.set_ylabel("deformation [√energy]")
+    axes.set_ylabel(label_deformation(energy_unit))
 
 
 def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
@@ -314,7 +314,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
     # below the energies only the windows are drawn
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
-    _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=page)
+    _finish_run_axes(figure, axes, *_label_run_axes(history), page=page)
     return figure
 
 
@@ -363,7 +363,7 @@ def draw_run(
         mark_span(axes, flight, "flight")
     for window in windows:
         axes.axvspan(*window, ymax=_STRIP, color=NEUTRAL, linewidth=0, label="rigid")
-    _finish_run_axes(figure, axes, add_unit("time", history.time_unit), page=True)
+    _finish_run_axes(figure, axes, *_label_run_axes(history), page=True)
     return figure
 
 
@@ -378,13 +378,21 @@ def draw_parts(answer: Parts) -> Figure:
         axes.plot(*curve, linewidth=1, label=make_plain_text(run.parts[at].name))
     for flight in answer.facts.flights:
         mark_span(axes, flight, "flight")
-    _finish_run_axes(figure, axes, "time", page=True)
+    _finish_run_axes(figure, axes, "time", "internal energy", page=True)
     return figure
 
 
-def _finish_run_axes(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
+def _label_run_axes(history: History) -> tuple[str, str]:
+    """Return the labels of the axes of time and energy."""
+    time_label = add_unit("time", history.time_unit)
+    return time_label, label_energy(history.energy_unit)
+
+
+def _finish_run_axes(
+    figure: Figure, axes: Axes, time_label: str, energy_label: str, *, page: bool
+) -> None:
     """Label the axes of a whole run, and put the legend below."""
-    axes.set(xlabel=time, ylabel="internal energy")
+    axes.set(xlabel=time_label, ylabel=energy_label)
     figures.format_axes(axes, legend=False)
     if page:
         figures.place_panels(figure, [axes], _PLAN_PANEL)
@@ -401,7 +409,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
     energy.plot(
         *draw_outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1
     )
-    energy.set(ylabel="internal energy")
+    energy.set(ylabel=label_energy(history.energy_unit))
     by_energy = bool(trade_off.offers) and all(
         offer.basis == "energy" for offer in trade_off.offers
     )

@@ -38,6 +38,31 @@ def name_energy(history: History) -> str:
     return f"internal energy of {list_names(parts, most=_NAMED)}"
 
 
+def label_energy(unit: str) -> str:
+    """Return the label of an axis of internal energy, with its unit if a file names it.
+
+    Examples
+    --------
+    >>> label_energy("mJ"), label_energy("")
+    ('internal energy [mJ]', 'internal energy')
+    """
+    return f"internal energy [{unit}]" if unit else "internal energy"
+
+
+def label_deformation(unit: str) -> str:
+    """Return the label of an axis of deformation, the square root of an energy.
+
+    Examples
+    --------
+    >>> label_deformation("mJ"), label_deformation("N*mm"), label_deformation("")
+    ('deformation [√mJ]', 'deformation [√(N*mm)]', 'deformation [√energy]')
+    """
+    if not unit:
+        return "deformation [√energy]"
+    root = f"√{unit}" if unit.isalpha() else f"√({unit})"
+    return f"deformation [{root}]"
+
+
 def list_situation_heading(
     situation: Situation, *, verbose: bool = False
 ) -> list[tuple[str, str]]:
@@ -47,11 +72,13 @@ def list_situation_heading(
     why = situation.vibration.reasons if verbose else None
     kinetic = "" if share is None else f", kinetic fraction {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
+    energy_unit = situation.history.energy_unit
+    unit = f" {make_printable(energy_unit)}" if energy_unit else ""
     lines = [
         ("history", describe_input(situation.history)),
         (
             "td",
-            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{kinetic}{estimate}",
+            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{unit}{kinetic}{estimate}",
         ),
         ("basis", f"{_describe_basis(situation)}{f': {why}' if why else ''}"),
     ]

@@ -87,7 +87,7 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
     Field("agree", "flag?", "True if the intervals from tr_low to tr_high of these runs have a time in common."),
     Field("common_tr", "number?",
-          "The tr of all runs if they agree. Otherwise the earliest tr that is acceptable in every run with status ok "
+          "The tr of all runs if they agree. Otherwise the earliest tr that is admissible in every run with status ok "
           "or none, and within the timing tolerance of each, if there is one.", lambda answer: answer.common.tr),
     Field("common_verdict", maybe(keys.VERDICT),
           "What to do with common_tr: the verdict for the worst run, from its own pair and from its error at "

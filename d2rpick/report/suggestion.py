@@ -77,7 +77,7 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     Field("td_window", "span?",
           "range in which td was chosen: --td-window, or the longest flight; null if td was given"),
     Field("longer_pair", maybe(keys.PAIR),
-          "longest acceptable pair in td_window, if it is much longer than the recommended pair but of lower quality",
+          "longest admissible pair in td_window, if it is much longer than the recommended pair but of lower quality",
           lambda answer: answer.longer),
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     Field("candidates", many(CANDIDATE), get=_add_decisions),

@@ -524,7 +524,9 @@ def _check_flight(case: Case) -> Iterator[Objection]:
 
 @set_passing(*_PASSING)
 @set_failing(_make_pair_deck(".0135867", "0.16"))
-@make_rule_decorator("D2R205", ERROR, "tr or td outside the reference history", BOTH)
+@make_rule_decorator(
+    "D2R205", ERROR, "tr or td outside the record of the reference run", BOTH
+)
 def _check_in_history(case: Case) -> Iterator[Objection]:
     """The energy outside the history is unknown, and so is the energy of a part that the history does not contain.
     d2rpick also reports a td within the first ten states if 1000 times this td lies in the history, because this td

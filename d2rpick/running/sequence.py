@@ -367,7 +367,7 @@ def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:
             wait = leg.findings.wait or 0.0
-            reason = "over before the wait"
+            reason = "over before the force-free time"
             by_start[start] = Window(start, start, end, end, wait, reason)
         ends_flight = leg.findings.contact is not None or leg.order.until >= limits.end
         if leg.order.rigid and ends_flight:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import FormatError, HistoryError, RangeError
+from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_names
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
@@ -109,7 +109,7 @@ class Watch:
     def state(self) -> Event:
         """Return whether the parts fly now, and since when."""
         if not self._events and self._last_time == float("-inf"):
-            message = "no file of a run yet; check the name if the run has begun"
+            message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)

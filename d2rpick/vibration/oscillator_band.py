@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -50,12 +51,13 @@ def residual_band(
     share = measures.phase_share(mode.alpha, mode.omega)
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent
-    hidden = fit.hidden_share * _count_opposed(fit, tr, td)
+    opposed = _count_opposed(fit, tr, td)
     stated_now, low, high = measures.band_about(
-        squared, off, hidden, fit.hidden_share * squared
+        squared, off, fit.hidden_share * opposed, fit.hidden_share * squared
     )
-    # a hidden mode is as likely as none, so the middle of what it adds is stated
-    notable = np.maximum(hidden - _HARMLESS, 0.0)
+    # beyond the errors of a solver, a hidden mode is as likely as none: the middle of what it adds is stated
+    beyond_solver = max(fit.hidden_share - SMALLEST, 0.0) * opposed
+    notable = np.maximum(beyond_solver - _HARMLESS, 0.0)
     return np.sqrt(np.square(stated_now) + notable / 2), low, high
 
 

@@ -229,10 +229,12 @@ class SignedParts(SignedAmplitudes):
 
     def known_at(self, td: float) -> bool:
         """Return True if the vibration energy at td exceeds the solver's errors."""
-        return bool(
-            self.vibration_energy(td)
-            >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time))
-        )
+        return bool(self.vibration_energy(td) >= SOLVER_FLOOR * self._highest_energy)
+
+    @cached_property
+    def _highest_energy(self) -> float:
+        """Return the highest energy of the vibration in the window [energy]."""
+        return float(np.max(self.vibration_energy(self.time)))
 
     def profile(self, td: float) -> Profile:
         """Return frozen-deformation errors at the times before ``td`` whose sign can be compared with that at td."""

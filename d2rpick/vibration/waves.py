@@ -99,14 +99,19 @@ class Waves(NamedTuple):
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Return the kinetic energy of the modes [energy]."""
-        turned = (self.rates / np.abs(self.rates)).reshape(-1, *(1,) * np.ndim(t))
-        return np.asarray(((self._each(t) * turned).real ** 2).sum(axis=0))
+        return self._sum_kinetic_energy(self._each(t))
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Return the internal plus kinetic energy of the modes [energy]."""
-        return np.asarray(
-            (self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t)
-        )
+        waves = self._each(t)
+        internal_energy = (waves.real**2).sum(axis=0)
+        return np.asarray(internal_energy + self._sum_kinetic_energy(waves))
+
+    def _sum_kinetic_energy(self, waves: Complex) -> Samples:
+        """Return the kinetic energy of complex waves, summed over the first axis [energy]."""
+        turns = self.rates / np.abs(self.rates)
+        turned = waves * turns.reshape(-1, *(1,) * (waves.ndim - 1))
+        return np.asarray((turned.real**2).sum(axis=0))
 
     def _each(self, t: Samples | float) -> Complex:
         """Return each complex wave, of the shape of ``t`` with an axis before it."""

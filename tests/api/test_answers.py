@@ -638,8 +638,8 @@ def test_a_figure_shows_itself() -> None:
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), "64ms"),
-            TypeError,
-            "of the run, 0.064 if it is s",
+            ValueError,
+            "give 0.064 if it is s, 64 if it is ms",
         ),
         (
             lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)),

@@ -233,7 +233,7 @@ def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> No
     )
     assert (
         "done-without-flight",
-        "the window 0.31 to 0.36: no flight is seen there",
+        "the window 0.31 to 0.36: no flight is found there",
     ) in planned.cautions
     assert window not in [row.window for row in planned.flights]
 
@@ -411,7 +411,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(
     """The car is rigid for 13 ms between two pushes, and for 108 ms after them; `parts` compares sets for 108 ms."""
     planned = plan_run(car, SHORT_MARGIN)
     assert list_statuses(planned) == ["left-out", "supported"]
-    assert "flight 2 behind it for 0.108: this window locks in energy" in (
+    assert "flight 2 after it for 0.108: this window freezes vibration energy" in (
         planned.flights[0].reason or ""
     )
     longest = require(suggest_in_run(car, None, SHORT_MARGIN).recommended)
@@ -448,8 +448,8 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
         "re-plan",
     ]
     reason = planned.flights[1].reason or ""
-    assert "flight 4 behind it for 0.192: this window locks in energy" in reason
-    assert "that flight would wait for one run more" in reason
+    assert "flight 4 after it for 0.192: this window freezes vibration energy" in reason
+    assert "that flight would need a further run" in reason
     plan_made = plan_run(box, PLAIN, min_rigid=0.07)
     assert list_statuses(plan_made)[:4] == [
         "supported",

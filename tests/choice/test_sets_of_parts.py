@@ -521,7 +521,7 @@ def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
     )
     (message,) = list_messages(document, "loose-pieces")
     assert message.startswith(
-        "parts 7-9 lie in 2 pieces that nothing joins; LS-DYNA makes one rigid body of them"
+        "parts 7-9 lie in 2 pieces that are not connected; LS-DYNA makes one rigid body of them"
     )
     radioss = run_json(
         "parts",
@@ -532,7 +532,7 @@ def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
     )
     assert {row["verdict"] for row in radioss["parts"]} == {"switch", "merge"}
     assert list_messages(radioss, "loose-pieces")[0].endswith(
-        "each of them needs a rigid body of its own"
+        "give each piece its own rigid body"
     )
 
 
@@ -563,7 +563,7 @@ def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
         for part_names in ("1-9", CAR)
     )
     message = (
-        "--merge 1 makes one rigid body of what nothing joins: parts 1-6; parts 7-9; "
+        "--merge 1 makes one rigid body of unconnected parts: parts 1-6; parts 7-9; "
         "leave it out to keep them apart"
     )
     assert f"warning: merged-apart: {message}\n" in merged.stderr
@@ -586,7 +586,7 @@ def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
     assert document["position_error"] is None
     (message,) = list_messages(document, "moves-apart")
     assert message.startswith(
-        "hubs, tyre (8), tyre (9) fly away from the other parts: nothing joins them"
+        "hubs, tyre (8), tyre (9) fly away from the other parts: nothing connects them"
     )
     alone = run_json(*arguments, "--part", CAR)
     assert alone["position_error"] > 0
@@ -646,11 +646,11 @@ def test_a_slow_swing_makes_the_error_a_lower_bound(
     assert verdict["position_error_part"] == "engine"
     assert verdict["position_error_is_lower_bound"] is bound
     assert (
-        "off by at least"
+        "out of place by at least"
         in d2.suggest(run, float(TD), **arguments).text("table", DisplayOptions())
     ) is bound
     assert all(
-        ("off by at least" in message) is bound
+        ("out of place by at least" in message) is bound
         for message in list_messages(verdict, "out-of-place")
     )
     planned = d2.plan(run, min_quality="poor", **arguments)

@@ -169,7 +169,8 @@ def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(
     file = put(tmp_path / "input", tabulate(lambda t: t * t))
     for command in ("suggest", "explore"):
         assert (
-            "so no td can be chosen; if you know the end of the load, give it as --after"
+            "no flight is found in the record, so no td can be chosen: the energy never falls; "
+            "if you know the end of the load, give it as --after"
             in read_refusal(command, str(file))
         )
     assert run("plan", str(file)).exit_code == 1

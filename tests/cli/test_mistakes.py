@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import read_refusal
+from tests.command import read_refusal, run
 
 ENERGY = "sample_data/energy.csv"
 MATSUM = "sample_data/rollover_box.matsum"
@@ -30,6 +30,30 @@ DECK = "sample_data/rollover_box.k"
         ),
         ("card --tr 0,0135 --td 0.2 --part 1", "write it with a decimal point, 0.0135"),
         (f"suggest --part bx {MATSUM}", "did you mean 'box'?"),
+        (
+            f"suggest --td 0.064 --td-window 0.06 0.07 {ENERGY}",
+            "give --td to keep that time, --td-window to have it chosen",
+        ),
+        (
+            f"suggest --td-window 0.06 {ENERGY}",
+            "'sample_data/energy.csv' is not a number: two numbers were expected",
+        ),
+        (
+            f"suggest --channel kinetic=total_energy {MATSUM}",
+            "QUANTITY=NAME was expected (did you mean 'kinetic_energy'?)",
+        ),
+        (
+            "card --solver ls-dyn --tr 0.06 --td 0.07 --part 1",
+            "'ls-dyn' was found (did you mean 'ls-dyna'?)",
+        ),
+        (
+            f"verify --switched {MATSUM} {ENERGY}",
+            "so no part seems to have been rigid; give the run with the switching cards, or --tr and --td",
+        ),
+        (
+            "study nothing/*",
+            "nothing/*: no file matches; check the name and the folder",
+        ),
     ],
 )
 def test_a_mistake_is_answered_with_its_cure(arguments: str, message: str) -> None:
@@ -49,3 +73,105 @@ def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
     done.write_text("0.1\n")
     message = read_refusal("plan", "--done", str(done), MATSUM)
     assert "done.txt:1: '0.1' was found, two numbers 'tr td' were expected" in message
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            " Livermore Software Technology\n" + " text\n" * 60,
+            "this is a listing of LS-DYNA; give the glstat, matsum or binout of the run",
+        ),
+        (
+            "time,internal_energy\n0,1\n1,2\n",
+            "2 states were found, at least 3 were expected; write the energies more often",
+        ),
+        (
+            "time,internal_energy\n" + "".join(f"{i},{i * i}\n" for i in range(200)),
+            "no flight is found in the record, so no td can be chosen: the energy never falls",
+        ),
+        (
+            "Time [ms],Internal energy [mJ]\n" + "".join(f"{i},1\n" for i in range(9)),
+            "no column 'Internal' (did you mean 'Internal energy [mJ]'?)",
+        ),
+    ],
+)
+def test_a_history_that_cannot_be_used_says_why(
+    tmp_path: Path, content: str, message: str
+) -> None:
+    history = tmp_path / "history"
+    history.write_text(content)
+    column = ("--energy", "Internal") if "[mJ]" in content else ()
+    assert message in read_refusal("suggest", *column, str(history))
+
+
+def test_energies_that_are_zero_in_all_states_are_named_so(tmp_path: Path) -> None:
+    table = tmp_path / "zero.csv"
+    table.write_text("time,internal_energy\n" + "".join(f"{i},0\n" for i in range(150)))
+    assert (
+        "the energy is 0 in all states"
+        in run("suggest", "--td", "64", str(table)).stderr
+    )
+
+
+def test_a_step_back_is_named_with_its_times(tmp_path: Path) -> None:
+    table = tmp_path / "back.csv"
+    times = [*range(100), *range(50, 200)]
+    table.write_text(
+        "time,internal_energy\n" + "".join(f"{t},{t % 7}\n" for t in times)
+    )
+    assert (
+        "time steps back once, from 99 to 50 (restart)"
+        in run("suggest", "--td", "150", str(table)).stderr
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("# ours\ncolour = 1\n", "d2rpick.toml:2: unknown key 'colour'"),
+        (
+            "\nmargn = 1\n",
+            "d2rpick.toml:2: unknown key 'margn' (did you mean 'margin'?)",
+        ),
+        ("margin = 'two'\n", "d2rpick.toml:1: margin: 'two' is not a number"),
+        (
+            "after = 0\n[suggest]\nafter = 0\nmargin = 'two'\n",
+            "d2rpick.toml:4: margin: 'two' is not a number",
+        ),
+        ("[suggest]\ndone = 'x'\n", "d2rpick.toml:2: suggest: unknown key 'done'"),
+        ("\n[sugest]\nmargin = 1\n", "d2rpick.toml:2: unknown key 'sugest'"),
+    ],
+)
+def test_a_wrong_setting_is_named_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, settings: str, message: str
+) -> None:
+    history = str(Path(ENERGY).resolve())
+    (tmp_path / "d2rpick.toml").write_text(settings)
+    monkeypatch.chdir(tmp_path)
+    line = read_refusal("suggest", "--td", "0.064", history)
+    assert message in line
+    assert len(line) < 2 * 120 + len(str(tmp_path))
+
+
+def test_a_missing_include_is_named_without_parts_too(tmp_path: Path) -> None:
+    deck = tmp_path / "main.k"
+    content = Path(DECK).read_text()
+    include = "*KEYWORD\n*INCLUDE\nmissing/mesh.k"
+    deck.write_text(content.replace("*KEYWORD", include, 1))
+    answer = run("plan", "--deck", str(deck), MATSUM)
+    assert "main.k:3: missing/mesh.k was not read: no such file" in answer.stderr
+
+
+def test_a_folder_without_a_run_is_named_by_follow(tmp_path: Path) -> None:
+    folder = tmp_path / "nofolder"
+    answer = run("follow", "--once", str(folder))
+    assert f"{folder}: no file of a run yet; check the name" in answer.stdout
+
+
+@pytest.mark.parametrize("td", ["0.05", "0.39"])
+def test_a_td_outside_the_flight_is_warned_about_once(td: str) -> None:
+    answer = run("suggest", "--td", td, "--part", "box", MATSUM)
+    warnings = [line for line in answer.stderr.splitlines() if "warning: " in line]
+    assert len([line for line in warnings if f"td = {td}" in line]) == 1
+    assert "the nearest flight is 0.086 to 0.379; td must lie in it" in answer.stderr

@@ -288,7 +288,7 @@ def test_the_next_window_is_planned_from_the_switched_run(
         *switched,
     ).stdout.splitlines()
     assert [tuple(map(float, line.split())) for line in lines] == [*windows, *new]
-    assert "a window that `done` names" in read_refusal(
+    assert "a window that --done names" in read_refusal(
         "plan", "-q", *PART, "--done", str(done), *history
     )
 

@@ -116,7 +116,7 @@ def test_verify_warns_where_it_is_large() -> None:
     )
     assert "1.4% of its path in the flight" in message
     assert message.endswith(
-        "this holds if the parts become one rigid body, which `deck` tells"
+        "this holds if the parts become one rigid body, which the deck of the run shows (`deck`)"
     )
     alone = run_json(
         "verify", "--tr", "0.0826", "--td", "0.1464", "--part", "12", locate_car()
@@ -290,7 +290,7 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
         candidate for candidate in suggestion["candidates"] if candidate["recommended"]
     )
     assert best["position_error_assumes"] == ONE_BODY
-    result = run("suggest", "-q", *arguments).stdout
+    result = join_wrapped_lines(run("suggest", "-q", *arguments).stdout)
     assert (
         "at td if the parts become one rigid body: engine is frozen at another place"
         in result

@@ -122,7 +122,7 @@ def test_no_program_no_output_and_no_overwriting_comes_from_a_file(
         message = ask_with_settings(
             command, write_settings_table(command, key, FORBIDDEN[key])
         )
-        assert f"d2rpick.toml: {key}: " in message
+        assert f"d2rpick.toml:2: {key}: " in message
         assert "never taken from a file; remove the key" in message
 
 

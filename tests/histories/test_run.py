@@ -136,7 +136,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
         (5.5, 55),
     ]
     assert (
-        "time steps back once (restart); the newer restart segment is used where they overlap"
+        "time steps back once, from 4 to 3 (restart); the newer restart segment is used where they overlap"
         in history.notes[0]
     )
 

@@ -40,12 +40,12 @@ def test_a_run_that_has_not_begun_says_so(folder: Path) -> None:
         assert (state.event, state.time, state.message) == (
             "state",
             None,
-            "no file of a run yet; check the name if the run has begun",
+            f"{name}: no file of a run yet; check the name if the run has begun",
         )
     (folder / "runT01").write_bytes(b"")
     assert (
         watch_to_end(folder)[-1].message
-        == "no file of a run yet; check the name if the run has begun"
+        == f"{folder}: no file of a run yet; check the name if the run has begun"
     )
     (folder / "runT01").write_bytes(LEGS[0][:200])
     assert watch_to_end(folder)[-1].message.startswith("cannot be read yet")

@@ -315,7 +315,8 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
         else:
             count = f"{history.time.size} states were"
         raise RangeError(
-            f"{', '.join(history.source)}: {count} found, choosing needs at least 3"
+            f"{', '.join(history.source)}: {count} found, at least 3 were expected; "
+            "write the energies more often, or wait until the run has written them"
         )
     history.energy_at(td, "td")
     if settings.after is not None:
@@ -334,7 +335,8 @@ def _find_other_models(
     first = float(history.time[0])
     last = float(history.time[-1])
     # without evidence of the next contact nothing is known about the time after td
-    end = flight.end or (last if is_flying or situation.evidence.span else td)
+    is_described = situation.evidence.span is not None or flight.source == "oscillator"
+    end = flight.end or (last if is_flying or is_described else td)
     start = first if flight.start is None else flight.start
     around = Span(min(td, start), end)
     is_guessed = flight.start is not None and flight.source == "energy"

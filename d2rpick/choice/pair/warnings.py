@@ -88,11 +88,13 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         )
         return
     if situation.energy_td <= 0:
-        text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
-        yield Caution(
-            "no-energy",
-            f"{text}; it must be above 0 to be matched at tr; choose another td",
-        )
+        if not situation.history.energy.any():
+            text = "the energy is 0 in all states; it must be above 0"
+            cure = "choose the column with the internal energy, as `energy`"
+        else:
+            text = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}; it must be above 0"
+            cure = "choose another td"
+        yield Caution("no-energy", f"{text} to be matched at tr; {cure}")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g},"
         yield Caution("poor-td", f"{lost} and no tr can keep it; choose another td")
@@ -157,13 +159,13 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    elif td <= earliest:
+    elif td <= earliest and not flight.refusal:  # the refusal says it already
         yield Caution(
             "td-in-load",
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
     yield from _warn_about_grazing(situation)
-    if td > situation.latest_td:
+    if td > situation.latest_td and not flight.refusal:
         yield Caution(
             "td-after-contact",
             f"td = {td:.6g} lies after {describe_end_of_flight(situation)}",

@@ -247,7 +247,9 @@ def add_deck_to_settings(
             open_ = [Caution("cost-unknown", f"the CPU time is not estimated: {why}")]
         else:
             open_ = []
-        return replace(settings, bodies=()), (*doubts_of_parts, *open_)
+        # parts in an include that is missing cannot be named
+        unread = warn_about_cost(model, used=False)
+        return replace(settings, bodies=()), (*doubts_of_parts, *unread, *open_)
     is_computed = settings.cost_share is None
     share = model.saved(ids) if is_computed else Share(settings.cost_share)
     with_cost = replace(

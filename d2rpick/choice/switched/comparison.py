@@ -373,7 +373,10 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
             moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
-        cure = switched.left_beside or "; give `tr` and `td`"
+        cure = (
+            switched.left_beside
+            or "; give the run with the switching cards, or `tr` and `td`"
+        )
         raise RangeError(f"{', '.join(switched.source)}: {reason}{cure}")
     first, last = max(moving, key=lambda span: time[span[1]] - time[span[0]])
     times_before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
@@ -392,10 +395,7 @@ def _explain_why_no_times(
     ):
         return "both runs have the same energies, so it may be the reference run again"
     if not spans:
-        return (
-            f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid; "
-            "was it switched?"
-        )
+        return f"the energy never stays constant for {FEWEST} states, so no part seems to have been rigid"
     first, last = spans[0]
     start, end = switched.time[first], switched.time[last]
     return f"the energy stays constant from {start:.6g} to {end:.6g}, but that of the reference run does too"

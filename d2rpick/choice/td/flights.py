@@ -49,14 +49,14 @@ def find_longest_flight(
         return otherwise
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
+        never_falls = bool((history.energy[1:] >= history.energy[:-1]).all())
+        reason = _NO_FLIGHT + (": the energy never falls" if never_falls else "")
         if held:
             reason = held
             cure = "name parts that nothing holds"
         elif settings.after is not None:
-            reason = _NO_FLIGHT
             cure = "give `td`"
         else:
-            reason = _NO_FLIGHT
             cure = "if you know the end of the load, give it as `after`"
         raise RangeError(f"{', '.join(history.source)}: {reason}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]

@@ -27,7 +27,7 @@ from d2rpick.histories.meaning import (
     is_time,
     refuse_other_quantity,
 )
-from d2rpick.histories.names import match_names, suggest_name
+from d2rpick.histories.names import check_energy_unit, match_names, suggest_name
 from d2rpick.histories.samples import check_one_run, count_rows_per_time
 
 if TYPE_CHECKING:
@@ -258,6 +258,10 @@ class Table(Database):
         if layout.sure not in (None, layout.columns) and layout.columns > 2:
             notes.append(_note_unsure_columns(layout))
         self._notes += [*notes, *left_out]
+
+    def find_energy_unit(self, channel: str) -> str:
+        """Return the unit of energy that the head of a column contains; empty without one."""
+        return check_energy_unit(self._layout.unit(self._columns[channel]))
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -310,7 +310,7 @@ class Blocks(Database):
         """Leave out an incomplete block, with a note."""
         if is_last:
             self.complete, self.rest = False, block
-        where = "the file" if is_last else "a leg of the run"
+        where = "the file" if is_last else "a restart segment of the run"
         self.notes += (
             f"{where} ends within the state of line {count_line_number(self._data, block.start)}, which was left out",
         )

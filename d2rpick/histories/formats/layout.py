@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from itertools import islice
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
 # A comma as both can be read only if the numbers are in quotes.
+# stands in the head of d3hsp and messag
+_LISTING_OF_LS_DYNA: Final = "Livermore Software"
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
@@ -162,11 +164,15 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     rows = [(number, line) for number, line in numbered if line.lstrip()[0].isdigit()]
     number, line = next(iter(rows or numbered), (1, ""))
     below = "below" if text.is_short else f"in the first {HEAD} lines"
-    problem = f"{text.name}:{number}: {quote_start(line)} and no rows of at least two numbers {below}"
+    problem = f"{text.name}:{number}: {quote_start(line)} was found, and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
     if rows and has_number(line.strip(), ".", ""):
         cure = "this file has one column; add the times"
-    return FormatError(f"{problem}; expected a table of time and energy; {cure}")
+    elif _LISTING_OF_LS_DYNA in line:
+        cure = (
+            "this is a listing of LS-DYNA; give the glstat, matsum or binout of the run"
+        )
+    return FormatError(f"{problem}; a table of time and energy was expected; {cure}")
 
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:

@@ -245,7 +245,7 @@ def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
         ("time;IE\n1.001;12,5\n1.002;12,6\n1.003;12,7\n", "1.001|12,5"),
         (
             "time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n",
-            "table:2: '0.0 ms,0.5 mJ' and no rows",
+            "table:2: '0.0 ms,0.5 mJ' was found, and no rows",
         ),
         ("IE,KE\n0.5,1\n0.6,2\n", "no column has the name of a time"),
     ],

@@ -113,7 +113,7 @@ def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
     run = open_contents(binout, bytes(made_binout([1, 2, 3, 4, 5, 3, 4]).data))
     assert run.databases[0].time.tolist() == expected("time", [1, 2, 3, 4])
     assert (
-        "time steps back once (restart); the newer restart segment is used where they overlap"
+        "time steps back once, from 0.625 to 0.375 (restart); the newer restart segment is used where they overlap"
         in run.notes[0]
     )
     assert run.history(Selection()).energy.tolist() == expected(

@@ -460,7 +460,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
             "run,IE,KE\na1,1,2\na2,2,3\n",
             "no column has the name of a time; choose with `time`",
         ),
-        ("time,IE\n", "table:1: 'time,IE' and no rows"),
+        ("time,IE\n", "table:1: 'time,IE' was found, and no rows"),
         ("time,IE\n0.0,1.5", "no states"),
     ],
 )
@@ -583,7 +583,7 @@ def test_numbers_from_the_disk_are_those_of_python(
 def test_words_without_numbers_are_refused_by_the_first_lines() -> None:
     with pytest.raises(
         FormatError,
-        match="'no table at all' and no rows of at least two numbers in the first",
+        match="'no table at all' was found, and no rows of at least two numbers in the first",
     ):
         read_table("no table at all\n" * 20_000)
 

@@ -167,7 +167,7 @@ def test_notes_say_what_was_left_out() -> None:
         in read_glstat(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
     )
     assert (
-        "a leg of the run ends within the state of line 29"
+        "a restart segment of the run ends within the state of line 29"
         in read_glstat(SCENARIOS[KILLED][0]).notes[0]
     )
     assert "kinetic" in read_glstat(WHOLE, "kinetic energy").notes[0]
