@@ -1,7 +1,7 @@
 """Choose tr and td: from a history to a recommendation, a verdict, a plan, or one answer for many runs.
 
-The question (`question`) is a reference run, the energy of it that is meant, and the settings.  It is answered in
-these steps:
+A question (`question`) consists of a reference run, the energy selected from it, and the settings.  It is answered
+in these steps:
 
 1. `situation` finds the flight around a td, the vibration in it, and the energy level at td.
 2. `candidates` finds the times at which the deformation may be that at td, measures each as tr, and judges it by the

@@ -59,13 +59,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# Most pairs at other peaks that are examined in full and refused before the search ends.
+# The search for a better pair ends after this many pairs at other peaks were examined in full and refused.
 _MOST_REFUSED = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PairVerdict(AnswerAtTd):
-    """Answer of ``verify``: the measures of one pair, and the reasons for and against it.
+    """The answer of ``verify``: the measures of one pair, and the reasons for and against it.
 
     ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``computed`` is the energy of the finished
     switched run, if there is one.
@@ -116,14 +116,14 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def _good_pair(self) -> Pair | None:
-        """The pair recommended by the reference run, regardless of a finished switched run."""
+        """The pair that the reference run recommends, whatever a finished switched run shows."""
         return find_good_pair(self.situation)
 
     @property
     def _is_refuted(self) -> bool:
-        """True if the finished switched run contradicts the pair recommended by the reference run.
+        """True if the finished switched run contradicts the pair that the reference run recommends.
 
-        Any tr within the timing tolerance is that pair.
+        A switched run with any tr within the timing tolerance tests that pair.
         """
         if self.switched is None or not self.switched.objections:
             return False
@@ -142,7 +142,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td, over that of the reference run; None if they are unknown."""
+        """Bounds of the mean energy after td, relative to the reference run; None if they are unknown."""
         return bound_mean_energy(self.situation, self.candidate)
 
 
@@ -153,7 +153,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is reused if its td is ``td``.
+    """Judge one pair; the situation ``earlier`` is reused if it belongs to the same td.
 
     Raises
     ------
@@ -218,7 +218,7 @@ class AcceptableWindow(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PairSuggestion(AnswerAtTd):
-    """Answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
+    """The answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
     ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
     in it, if much rigid time was given up for quality.
@@ -239,7 +239,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def why_none(self) -> str:
-        """Reason why no pair is recommended; empty if one is."""
+        """Reason why no pair is recommended; empty if a pair is recommended."""
         return "; ".join(
             caution.message
             for caution in self.cautions
@@ -253,7 +253,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """Estimate of the time after td on basis "energy"; None on other bases."""
+        """Estimate of the motion after td on basis "energy"; None on other bases."""
         if self.situation.basis != "energy":
             return None
         return estimate_time_after(
@@ -262,10 +262,10 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
-        """First and last acceptable tr of each window, on any basis [time]."""
+        """First and last tr of each window of acceptable tr, on any basis [time]."""
         if not self.situation.in_flight:
             return ()
-        # imported here: an oscillator does not need it
+        # Imported here to keep start-up fast.
         from d2rpick.choice.pair.windows import (
             find_acceptable_windows,
         )
@@ -301,7 +301,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The clearly better pair if its residual shows that it is not poor, otherwise None."""
+        """The clearly better pair, if its residual shows that it is not poor; otherwise None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
@@ -321,12 +321,12 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td for the recommended tr, over that of the reference; None if unknown."""
+        """Bounds of the mean energy after td for the recommended tr, relative to the reference run; None if unknown."""
         return bound_mean_energy(self.situation, self.chosen) if self.chosen else None
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair if its quality differs clearly from that of the recommended pair, otherwise None.
+        """The better pair, if it is clearly better than the recommended pair; otherwise None.
 
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
@@ -359,7 +359,7 @@ def suggest_at(
 ) -> PairSuggestion:
     """Rank the candidates for tr in a given situation, recommend one, and search for a better td.
 
-    ``ranked`` are the ranked candidates if they are known, up to the recommended one at least.
+    ``ranked`` lists the ranked candidates, at least up to the recommended one, if they are already known.
     """
     candidates = next(rank_candidates([situation])) if ranked is None else ranked
     best = candidates.chosen
@@ -382,9 +382,9 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair at the nearest energy peak of the flight with such a pair; None without one.
+    """Return the recommended pair of the nearest energy peak in the flight that has one; None if no peak has one.
 
-    The record is examined anew at that td, so that the pair is the answer to a question for that td.
+    The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
     start = situation.earliest_tr
     if start is None:
@@ -426,9 +426,9 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _is_level_refused(situation: Situation) -> bool:
-    """Return True if no tr can have the level at td, because it is negative or too high.
+    """Return True if no tr can have the energy level at td, because that level is negative or too high.
 
-    Noise makes thousands of such peaks, so that this test saves time.
+    This test saves time, since noise makes thousands of such peaks.
     """
     if situation.basis != "energy":
         return False
@@ -445,15 +445,15 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
-    """Examine the same record at another td, as if the user had given that td."""
-    # an oscillator is searched again, but not the reason for its absence
+    """Examine the same record at another td in the same way as at a td that the user gives."""
+    # An oscillator is searched for again, but not the reason why there is none.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` accepts a pair once it is rounded to the six printed digits."""
-    # rounding moved a time beyond the record, or made both equal
+    # Rounding may move a time beyond the record, or make both times equal.
     try:
         return verify_at(
             _examine_anew(situation, round_as_read(td)), round_as_read(tr)
@@ -490,10 +490,10 @@ def suggest_in_run(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
-    """Choose tr for ``td``, or both times with td in a window (low, high), or in the longest flight for None [time].
+    """Choose tr for ``td``, or both times if ``td`` is a window (low, high) or None (the longest flight) [time].
 
-    With ``with_better`` False no better td is searched for a given td.  If td is chosen, no flight is assumed to begin
-    before ``since``, and ``times`` are tried besides the energy peaks, by default an even grid [time].
+    If ``with_better`` is False, no better td than a given td is searched for.  If td is chosen, no flight is assumed to
+    begin before ``since``, and ``times`` are tried in addition to the energy peaks, by default an even grid [time].
 
     Raises
     ------
@@ -502,7 +502,7 @@ def suggest_in_run(
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
-        # imported here: a given td needs no search
+        # Imported here to keep start-up fast.
         from d2rpick.choice.td.suggest_td import (
             choose_td,
         )
@@ -526,7 +526,7 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair of a reference run; errors and ``earlier`` are those of `verify_in_history`."""
+    """Judge one pair of a reference run, with the errors and the argument ``earlier`` of `verify_in_history`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     return _add_health(
         verify_in_history(reference.history, tr, td, settings, earlier), reference.run
@@ -539,7 +539,7 @@ def compare_with(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> PairVerdict:
-    """Add to a verdict the comparison of a finished switched run with the reference run of the verdict.
+    """Add the comparison of a finished switched run with the reference run to a verdict.
 
     Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
     of the reference run [-].

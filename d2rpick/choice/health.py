@@ -1,7 +1,7 @@
 """Judge the health of a run: whether its energies are reliable, which loads act in the window, and when to refuse it.
 
-A term that the files do not have gives None, never 0.  Shares refer to the peak of the internal energy, as is usual in
-practice, and are left out if that peak is tiny.
+A term that the files lack gives None, never 0.  Shares are relative to the peak of the internal energy, as is usual
+in practice, and are None if that peak is tiny.
 """
 
 from __future__ import annotations
@@ -35,31 +35,28 @@ MOST_IMBALANCE = 0.10
 # Source: dynasupport.com/howtos/general/contact-energy.
 # Negative contact energy has no physical cause but comes from penetrations; Oasys' check allows 5 % of either sign.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# In free flight contacts do no work, and deleted elements may not have more energy than this share.
-# LS-DYNA keeps their energy in the internal energy of the model (ftp.lstc.com, FAQ energy_balance).
-
-# Internal energies below this share of the largest energy of the run, or below this floor, are rounding errors.
+# Internal energies below the first share of the run's largest energy, or below the second value, are rounding errors.
 # Single precision and glstat have six to seven digits; LS-DYNA's internal energy starts at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
-# Parts below this share of the largest internal energy of a part do not matter for the sum [-].
+# Parts whose internal energy is below this share of the largest part energy are ignored [-].
 _SMALL_PART = 0.01
-# While a run has hardly any energy, a small error is a large ratio (Altair, Radioss FAQ on the energy error).
-# The ratio is used while its reference exceeds this share of its peak; then 10 % are 1 % of the peak or more.
+# The energy ratio is used only while the energy to which it refers exceeds this share of its peak,
+# since a small error is a large ratio while a run has hardly any energy (Altair, Radioss FAQ on the energy error).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
-# Codes of warnings that do not concern parts whose own momentum shows a free flight.
+# Codes of warnings that do not matter if the momentum of the parts shows their free flight.
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# Criteria of a run that diverged: within 5 % of the record its kinetic energy exceeds all earlier energies by 1e9,
-# the internal energy is still below 1e-6 of it, and the internal energy grows by a factor of 1000.
-# A load on a body at rest deforms and moves it; a velocity given to the whole body does not deform it.
+# Criteria of a run that diverged: within this share of the record its kinetic energy exceeds all earlier energies by
+# a factor of 1e9, the internal energy is still below 1e-6 of it, and the internal energy grows by a factor of 1000.
+# Sound runs do not do this: a load on a body at rest also deforms it, and an initial velocity deforms nothing.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# Fewest earlier states with energy: the first states of a body at rest contain round-off or 0.
+# This many earlier states must have energy, because the first states of a body at rest contain round-off or 0.
 _FEWEST: Final = 12
-# Energies below this value are zero in any unit: those of LS-DYNA start at 2e-20 per process.
+# Energies below this value are treated as zero in any unit; LS-DYNA's energies start at 2e-20 per process.
 _NOTHING: Final = 1e-20
 
 
@@ -145,7 +142,7 @@ def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | 
 
 
 def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
-    """Yield the warnings about the health of a run, with stable codes.
+    """Yield the warnings about the health of a run; their codes are stable.
 
     If nothing vibrates (``at_rest``), no level of the internal energy is matched, so hourglass energy does not matter.
     """
@@ -158,9 +155,9 @@ def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caut
 
 def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
-    if not any("T0" in name for name in sources):  # not an engine run of Radioss
+    if not any("T0" in name for name in sources):  # not a Radioss engine run
         return
-    # imported here: other histories do not need it
+    # Imported here to keep start-up fast.
     from d2rpick.histories.listings import (
         find_wrong_energies,
     )
@@ -192,6 +189,7 @@ def _is_unbalanced(health: Health) -> bool:
 
 
 # Code of each warning, the condition for it, and its text.
+# LS-DYNA keeps the energy of eroded elements in the model's internal energy (ftp.lstc.com, FAQ energy_balance).
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
      f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
@@ -233,7 +231,7 @@ def _find_peak(balance: Balance) -> float | None:
 
 
 def _compute_share(energy: Samples | None, peak: float | None) -> float | None:
-    """Return the highest value relative to the peak of the internal energy [-]; 0 if it is never positive."""
+    """Return the highest value of a term relative to the peak of the internal energy [-]; 0 if it is never positive."""
     if energy is None or peak is None:
         return None
     return max(0.0, float(energy.max())) / peak
@@ -307,7 +305,7 @@ def _compute_total(balance: Balance) -> Samples | None:
 def _measure_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
-    """Return contact, eroded and external energy in the window as fields of `Health`: shares of its energy."""
+    """Return contact, eroded and external energy in the window as fields of `Health`, as shares of the energy there."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         if balance.time[inside].size:
@@ -338,7 +336,7 @@ def refuse_unsound(
     *,
     choosing: bool = True,
 ) -> None:
-    """Raise RangeError if the run cannot be used at all, or a given time seems to have another unit.
+    """Raise RangeError if the run cannot be used at all, or if a given time seems to be in another unit.
 
     With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
     and end of the flight in the settings.
@@ -387,7 +385,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # states more than 5 % of the record before each state
+    # number of states that lie more than 5 % of the record before each state
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
@@ -397,7 +395,7 @@ def _describe_divergence(history: History) -> str | None:
         for energies in (kinetic + internal, internal)
     )
     gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
-    # divide, since products might overflow
+    # Quotients are compared, since products might overflow.
     gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)

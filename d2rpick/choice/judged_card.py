@@ -1,4 +1,4 @@
-"""Print cards whose times were judged by an energy history."""
+"""Print cards whose times were judged with an energy history."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ if TYPE_CHECKING:
 
 
 def complete_printing(printing: Printing, history: History) -> Printing:
-    """Complete the options of a card from a history.
+    """Fill in missing options of a card from a history.
 
-    The history gives the solver that wrote it, its chosen parts, its end as the end of the run, and the times at which
-    a contact pushes.
+    The history defines the solver, the chosen parts, the end of the run, and the times at which a contact force acts.
     """
     solver = printing.solver or find_solver(history.format)
     ids = printing.part or tuple(part.id for part in history.parts or ())
@@ -52,11 +51,11 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Add the times at which the named contact or rigid wall pushes, and the closing speed of the parts.
+    """Add the times at which the force of the named contact or rigid wall acts, and the closing speed of the parts.
 
-    The contact force of the solver shows the times, or else the momenta of the parts; only momenta show the speed.
+    The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
     """
-    # imported here: other cards do not need it
+    # Imported here to keep start-up fast.
     from d2rpick.flight.contact_times import (
         find_contact_times,
         find_force_times,
@@ -80,7 +79,7 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
 def print_pair(
     reference: Reference, situation: Situation, tr: float, printing: Printing
 ) -> PrintedCard | None:
-    """Print the card of ``tr`` and the td of a situation, judged by the printed times; None without parts to switch."""
+    """Print the card for ``tr`` and the td of a situation, judging the printed times; None without parts to switch."""
     history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation
@@ -99,11 +98,11 @@ def print_judged_card(
     printing: Printing,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
-    """Print the card of windows with the verdicts that ``judge`` gives for the printed tr and td.
+    """Print the card for some windows, with the verdicts that ``judge`` returns for the printed tr and td.
 
-    ``printing`` is completed by the history.  ``done`` are windows in which the run was switched already: they are
-    printed too, but cannot be judged by it.  The result is None if the parts, or the main nodes for some solvers, are
-    not given.
+    The history completes ``printing``.  In the windows ``done`` the run is already switched: they are printed too, but
+    this run cannot show whether they are good.  The result is None if the parts, or for some solvers the main nodes,
+    are not given.
     """
     if not list_switched(printing):
         return None
@@ -122,10 +121,10 @@ def print_judged_card(
 
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Return the windows of switches by force, narrowed to output states, as they are judged."""
+    """Return the windows to judge: windows of switches by force are narrowed to the output states inside."""
     from d2rpick.flight.contact_times import (
         narrow_to_states,
-    )  # imported here: other cards do not need it
+    )  # Imported here to keep start-up fast.
 
     narrowed = (narrow_to_states(history.time, *window) for window in windows)
     return tuple((tr, td) for tr, td in narrowed if td is not None)
@@ -134,7 +133,7 @@ def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, 
 def _list_card_remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[PairVerdict]
 ) -> Iterator[str]:
-    """Yield comments on the card: windows not judged, the level of the whole model, and the verdicts."""
+    """Yield comments for the card: windows that were not judged, the level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
@@ -164,7 +163,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # there is no level to match, as the warning says
+    if verdict.situation.at_rest:  # there is no level to match
         return
     measures = [
         f"{name} {value:.3f}"
@@ -181,5 +180,5 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
 
 
 def _format_as_sentence(text: str) -> str:
-    """Return a reason as a sentence."""
+    """Return a reason with a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}."

@@ -1,4 +1,4 @@
-"""Declare each option of a choice once: its type, default, help and range, where it is asked, and what it limits.
+"""Declare the options of a choice: type, default, help and range, the commands that have each, and what it limits.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -29,10 +29,10 @@ _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
-    """A limit that a recommended pair must keep; a pair whose value is unknown does not keep it.
+    """A limit that a recommended pair must keep. A pair whose value is unknown does not keep the limit.
 
-    ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  ``is_lower``: the value must
-    not lie below the limit, instead of above it.
+    ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
+    value must not be below the limit, otherwise not above it.
     """
 
     quantity: str
@@ -58,7 +58,7 @@ class Limit(NamedTuple):
         >>> Limit("rigid_time", is_lower=True).explain(0.012, 0.02)
         'rigid time 0.012 below the limit 0.02'
         """
-        # imported here: a start needs no message
+        # Imported here to keep start-up fast.
         from d2rpick.histories.digits import format_beyond_limit
 
         name = _QUANTITIES.get(self.quantity, self.quantity.replace("_", " "))
@@ -72,8 +72,9 @@ class Limit(NamedTuple):
 class Use(NamedTuple):
     """How an option of a choice is used.
 
-    ``limit``: what its value limits, None if it is no limit.  ``of_cards``: ``card`` and ``check --history`` take it
-    too.  ``of_sets``: ``parts`` and ``study`` take it too.  ``is_advanced``: it stands in the last section of the help.
+    ``limit`` is what its value limits, None if it is not a limit.  ``of_cards``: ``card`` and ``check --history`` have
+    the option too.  ``of_sets``: ``parts`` and ``study`` have it too.  ``is_advanced``: the last section of the help
+    lists it.
     """
 
     limit: Limit | None = None
@@ -83,12 +84,12 @@ class Use(NamedTuple):
 
 
 def _describe_use(**use: Any) -> dict[str, Use]:
-    """Return the metadata of a field that say how an option is used."""
+    """Return the metadata of a dataclass field that describe how an option is used."""
     return {"use": Use(**use)}
 
 
-# Not frozen although it is never changed, like other tables of options: frozen classes cost each command 2 % of its
-# start.
+# Not frozen although it is never changed, like other tables of options, because frozen classes take 2 % of the
+# start-up time of each command.
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """How to choose and judge a pair; times have the unit of the history.
@@ -166,7 +167,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # elements that are rigid no longer limit the time step, so it cannot become smaller
+    # Rigid elements do not limit the time step, so that this cannot become smaller.
     step_ratio: float | None = make_option(
         "Ratio of the time step while rigid to the one before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,
@@ -176,7 +177,7 @@ class ChoiceOptions:
 
     @property
     def limits(self) -> Iterator[tuple[Limit, float]]:
-        """The limits of a recommendation that are set, with their values."""
+        """The limits of a recommendation that the user has set, with their values."""
         for name, use in list_uses().items():
             value = getattr(self, name)
             if use.limit is not None and value is not None:

@@ -1,4 +1,4 @@
-"""Describe the files of a run before anything is chosen from them."""
+"""Describe the files of a run, for ``info``."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Output of Radioss with part momenta.
+# the Radioss output that contains part momenta
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
@@ -61,7 +61,7 @@ class PartOverview(NamedTuple):
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall by name, and the intervals (start, end) in which it ``acts`` [time]."""
+    """The name of a contact or rigid wall, and the intervals (start, end) in which it ``acts`` [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
@@ -109,7 +109,7 @@ class Overview(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Verdict on choosing switch times by this run: "use", "use with care" or "do not use"."""
+        """Verdict on whether switch times can be chosen from this run: "use", "use with care" or "do not use"."""
         if self.unjudged or not self.flights:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
@@ -126,7 +126,7 @@ class Overview(NamedTuple):
 
     @property
     def _doubts(self) -> list[str]:
-        """Reasons why a run with flights is only usable with care."""
+        """Reasons why a run with flights can be used only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
@@ -154,7 +154,7 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
 
 
 def _describe_health(health: Health | None) -> str:
-    """Describe that the energies are within their limits, as far as they are written."""
+    """State that all written energies are within their limits."""
     if health is None or health.energy_ratio_min is None:
         return (
             "the health of the run is unknown, because the files contain no energy balance "
@@ -244,7 +244,7 @@ def _read_times(first: Legs) -> tuple[Samples, str | None]:
 def _list_notes(
     run: OpenedRun, selection: Selection, refusal: str | None
 ) -> Iterator[str]:
-    """Yield what the readers left out or assumed, with the ``refusal`` of the times."""
+    """Yield what the readers omitted or assumed, and the reason ``refusal`` why times could not be read."""
     yield from run.left_out
     for database in run.databases:
         yield from _read_notes(database)
@@ -266,7 +266,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
     """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
-    # imported here: few runs have a deck
+    # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
         check_model_of_deck,
@@ -282,7 +282,7 @@ def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ..
 
 
 def _name_missing_output(run: OpenedRun) -> str:
-    """Name the solver output with part momenta that these files lack."""
+    """Name the solver output that contains part momenta, which these files lack."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         output = _RADIOSS
@@ -313,7 +313,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
         energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
-    if energies is None:  # a part is missing in some states, so its column has gaps
+    if energies is None:  # a part is missing in some states
         return (
             PartOverview(part, _find_highest_energy_of_part(run, part))
             for part in run.parts
@@ -330,7 +330,7 @@ def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
 
 
 def _find_maximum(energies: Samples) -> float | None:
-    """Return the largest energy; None if there are none."""
+    """Return the largest energy; None without energies."""
     return float(energies.max()) if energies.size else None
 
 

@@ -1,4 +1,4 @@
-"""Define a question: a run, its selected energy, and the settings for the choice."""
+"""Define a question, which consists of a run, its selected energy, and the settings for the choice."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Reference(NamedTuple):
     def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
         """Read the selected energy of an open run; FormatError if it is missing."""
         if selection.parts:
-            # imported here: tables have no parts
+            # Imported here to keep start-up fast.
             from d2rpick.flight.momentum import (
                 replace_words_by_part_ids,
             )
@@ -44,7 +44,7 @@ class Reference(NamedTuple):
         return cls(run, run.history(selection))
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the same parts from another run of the model, regardless of the names in the request."""
+        """Read the same parts from another run of the same model, even if the request named them differently."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)
@@ -60,10 +60,10 @@ def read_reference(
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-# Not frozen, like the table of options that it extends, although it is never changed.
+# Not frozen although it is never changed, because the table of options that it extends is not frozen.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Settings(ChoiceOptions):
-    """Settings of the analyst: the options of a choice, and what the deck of the run says about it.
+    """The analyst's settings: the options of a choice, and the data from the deck of the run.
 
     ``oscillator``: given instead of identified.  ``replay`` False: judge by the energy level alone.  ``min_quality``:
     lowest grade of a pair that is planned, and that a deck passes with.  ``bodies``: rigid bodies that the parts
@@ -84,7 +84,7 @@ class Settings(ChoiceOptions):
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def run_time_share(self, rigid_fraction: float) -> float | None:
-        """Return the expected run time over that of the reference run [-]; None if the cost share is unknown."""
+        """Return the expected run time relative to the reference run [-]; None if the cost share is unknown."""
         share = self.cost_share
         if share is None:
             return None

@@ -10,10 +10,10 @@ order:
 3. `work` finds windows in which the contact energy is constant (p and forces are unknown), or in which external
    work, kinetic and internal energy change as gravity and damping change them: as parabolas of time.
 4. `internal_energy` finds the window in which the internal energy alone keeps its level, the poorest evidence.
-   Beside better evidence it must keep its level as well: bodies that collide keep their momentum.
+   The energy must keep its level even if better evidence shows a flight, since bodies that collide keep their momentum.
 5. `flight` asks these sources of evidence, best first.  The best source that shows a flight at td decides; a better
-   one that shows none there is never overruled.  The later start and the earlier end of two sources count.  What
-   supports of the deck hold does not fly.
+   one that shows none there is never overruled.  If two sources differ, the later start and the earlier end are used.
+      Supported parts do not fly.
 6. `chosen` joins this evidence with an oscillator that describes the energy, and with what the user gives
    (``--after``, ``--landing``), which overrules evidence with a doubt.
 

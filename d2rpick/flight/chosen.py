@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History, Samples
 
-# Fewest turning points of an energy that vibrates about a constant level; with fewer the energy must be constant.
+# An energy with at least this many turning points may vibrate about a level. With fewer it must be constant.
 _LEAST_TURNS: Final = 4
 
 
@@ -138,7 +138,7 @@ def start_flight_at(
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
-    )  # the oscillator is fitted from `after` on, so its start is no evidence of the end of the load
+    )  # The oscillator is fitted from `after` on, so its start does not show when the load ends.
     if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):
@@ -200,12 +200,12 @@ def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
 
 
 def _find_end_of_window(history: History, described: Described) -> float | None:
-    """Return the end of a described window; None if the record ends there."""
+    """Return the end of the window that an oscillator describes; None if the window lasts to the end of the record."""
     return described.end if described.end < history.time[-1] else None
 
 
 def _detect_load_in_window(history: History, described: Described) -> float:
-    """Return NaN if the energies in a window change by more than damping of the vibration explains, else 0."""
+    """Return NaN if damping of the vibration cannot explain how much the energies in a window change, else 0."""
     from d2rpick.flight.work import is_taken_by_damping
 
     if history.balance is None:
@@ -216,7 +216,7 @@ def _detect_load_in_window(history: History, described: Described) -> float:
 
 
 def _explain_why_fed(history: History, start: float, end: float) -> str | None:
-    """Return the reason why the energies show that a window is not a flight; None if there is no such reason.
+    """Return the reason why a window cannot be a flight according to the energies; None if there is no such reason.
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
     """

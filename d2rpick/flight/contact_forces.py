@@ -1,4 +1,4 @@
-"""Find flights from the forces of contacts and rigid walls, as the windows without such a force.
+"""Find flights from contact and rigid-wall forces: a flight is a window without such a force.
 
 Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
 its parts, and a contact whose force is not written, or any other load, may act all the same.
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
 
 # An external contact leaves at least this share of its impulse in the momentum of the model.
-# In sampled forces of intermittent contacts 1/3 of the impulse is uncertain.
+# The share is this small because 1/3 of the impulse of an intermittent contact may fall between two states.
 _INNER: Final = 0.2
-# Number of pieces of a flight whose mean energies are compared. A rise of the mean by the second share of the
-# highest energy shows a crash: computed flights with many beating modes rise by up to 0.06, a crash by nearly 1.
+# First: number of pieces of a flight whose mean energies are compared.
+# Second: a mean energy that rises by this share of the highest energy shows a crash.
+# In computed flights with many beating modes the mean rises by up to 0.06, in a crash by nearly 1.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
@@ -41,7 +42,7 @@ class Touches(NamedTuple):
     def of(
         cls, forces: Sequence[ContactForce], whole: Momenta | None = None
     ) -> Touches | None:
-        """Join the forces of all contacts that are intermittent; return None if there is none.
+        """Combine the forces of all intermittent contacts; return None if there are none.
 
         A contact that always acts holds parts together, like a tied one; one that never acts may belong to other parts.
         One that does not change the momentum of the ``whole`` model, if this is known, acts between the model's own
@@ -64,7 +65,7 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Return the window without contact around ``td`` [time]; None if there is a contact or it is too short.
+        """Return the window without contact around ``td`` [time]; None if a contact acts at td or it is too short.
 
         Forces do not show whether gravity acts, so gravity is NaN.
         """

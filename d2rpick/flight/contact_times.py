@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# A force acts if it changes the momentum by this many times the largest deviation in the longest flight.
+# A change of momentum shows a force if it exceeds the largest deviation in the longest flight by this factor.
 _SEEN: Final = 4.0
-# Smaller forces, as a fraction of the weight, are ignored: the first state has the momenta of half a step earlier.
+# Forces below this share of the weight are ignored, because momenta in the first state belong to half a step earlier.
 _OF_WEIGHT: Final = 0.1
 # Number of states left out at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-_FEWEST: Final = 2  # smallest number of intervals that remain
-# A force that acts within a single interval is placed in the middle third of it.
+_FEWEST: Final = 2  # the longest flight must keep this many intervals
+# A force that is seen in only one interval is assumed to act for this share of the interval, in its middle.
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 
@@ -87,8 +87,8 @@ def narrow_to_states(
 ) -> tuple[float, float | None]:
     """Return the first state at or after ``tr`` and the last state at or before ``td`` [time].
 
-    A switch by a contact comes with its first or last force, which is somewhere between two states.  The flight is
-    known to the last state without a force.  Where there is no state between them, both times stay.
+    A sensor switches at the first or last contact force, which is somewhere between two states.  The flight is certain
+    only between states without a force.  If there is no state between ``tr`` and ``td``, both times are kept.
 
     Examples
     --------
@@ -109,12 +109,12 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
     force : ContactForce
         As read from a file.
     least : float
-        Only a mean force of an interval above this counts [force]; 0 for any.
+        Intervals whose mean force is below this are treated as free of force [force]; with 0 any force counts.
 
     Returns
     -------
     ContactTimes or None
-        None where there are too few states, or where forces are asked for of which only the changes are known.
+        None if there are too few states, or if ``least`` is given although only changes of the force are known.
     """
     time = force.time
     acts = force.acts
@@ -136,7 +136,7 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
 def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
     """Return start and end of a force that acts in the intervals from ``first`` up to ``stop`` of the record.
 
-    A force that acts in the first interval, or in the last one, is taken to act from its start, or to its end.
+    A force in the first interval is assumed to act from the start of the record, one in the last interval to its end.
     """
     start = float(time[first])
     end = float(time[stop])

@@ -43,14 +43,14 @@ SOURCES: Final = (
 )
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# Largest work of a load in a flight, as a fraction of the energy. An energy error of 4 % is a deformation error of 2 %,
-# and two candidates whose deformations differ by 2 % are ranked as equally good.
+# Largest work of a load in a flight, as a share of the energy.
+# It causes a deformation error of 2 %, and deformations that differ by 2 % are ranked as equally good.
 MOST_WORK: Final = 0.04
-# Sources that must confirm each flight of a better source, since they see the contacts of all parts.
+# These sources must confirm each flight that a better source shows, because they contain the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# Sources that cannot see all loads: some forces are not written, and fixed walls do no work.
+# These sources may miss a load: some forces are not written, and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Two sources agree about the end of a flight if they differ by this share of it, or by this many output intervals.
+# Two ends of a flight agree if they differ by at most this share of its length, or by this many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
 
 
@@ -92,7 +92,7 @@ class Flight(NamedTuple):
 
     @property
     def unknown_load(self) -> bool:
-        """Return True if a load acts in the flight that may be gravity, a pull or friction."""
+        """Return True if a load of unknown kind acts in the flight: gravity, a pull or friction."""
         return self.source != "given" and not isfinite(self.gravity)
 
     @property
@@ -108,9 +108,9 @@ class Flight(NamedTuple):
 
 
 class Witness(NamedTuple):
-    """A source of evidence: its flight ``around`` a given time, and all its ``flights`` in ascending order.
+    """A source of evidence: it gives the flight ``around`` a time and the list of all ``flights`` in ascending order.
 
-    If ``decisive`` is True, a time at which it shows no flight has none, even if it shows no flight anywhere.
+    If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
     """
 
     source: str
@@ -145,7 +145,7 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td, found from the first search mark in it, or else from td itself."""
+        """Return the flight around td. The search begins at the first search mark in it, or else at td itself."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
@@ -156,7 +156,7 @@ class Witness(NamedTuple):
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``, searched from marks shared by many td, or else from td itself."""
+    """Return the flight around ``td``. The search begins at marks shared by many td, or else at td itself."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -166,7 +166,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time as it is found for a td in its middle, as listed flights are."""
+    """Return the flight around a time, searched for again from its middle, so that it equals the listed flight."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
@@ -178,7 +178,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Result of the evidence at a td: the flight around it, or the nearest flight and the reason why td is in none.
+    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is in none.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -226,7 +226,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 
 def _explain_refusal(history: History, witness: Witness, td: float) -> str:
-    """Return the reason why td [time] is in no flight, also if only the momentum shows one."""
+    """Return the reason why td [time] is in no flight, even if the momentum alone shows one."""
     if witness.source == "momentum":
         from d2rpick.flight.momentum import (
             find_flight_around,
@@ -246,7 +246,7 @@ def _explain_refusal(history: History, witness: Witness, td: float) -> str:
 
 
 def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Find all flights of the best source that no other source contradicts, with their sources, in ascending order."""
+    """Find all flights that the best source shows and no other source contradicts, each with its source."""
     sources = list_witnesses(history)
     for rank, witness in enumerate(sources):
         confirmed_flights = []
@@ -281,7 +281,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 
 
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
-    """Return True if a source is able to contradict a flight of a better source.
+    """Return True if a source may contradict a flight that a better source shows.
 
     If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
     """
@@ -438,7 +438,7 @@ def _limit_to_level(
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
     if start is not None and start > flight.start and momenta is not None:
-        # without gravity the sum of energies; with gravity the last sum minus the work of gravity
+        # Without gravity this is the sum of energies. With gravity the work of gravity is subtracted from the last sum.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -451,7 +451,7 @@ def _limit_to_level(
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
-            return None  # opposite forces that hold and deform the model do work and may still act
+            return None  # Opposite forces may still hold and deform the model, which keeps its momentum.
     return flight._replace(start=start)
 
 
@@ -474,7 +474,7 @@ def name_source(source: str | None) -> str:
 
 @remember
 def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> Seen:
-    """Join the flights of the best source and of those that should agree with it, and note disagreements."""
+    """Combine the best source's flight with the flights of the sources that must confirm it, and note disagreements."""
     source, best = shown_flights[0]
     refusal = _explain_why_driven(history, source, best)
     if refusal:
@@ -514,7 +514,7 @@ def get_agreement_limit(history: History, start: float, end: float) -> float:
 def _explain_why_driven(
     history: History, source: str, flight: FreeFlight
 ) -> str | None:
-    """Return the reason why a load drives a flight; None if no load does work, or only on other parts."""
+    """Return the reason why a load drives a flight; None if no load does work, or if it acts only on other parts."""
     from d2rpick.flight.work import compute_work_beyond_gravity
 
     balance = history.balance
@@ -531,7 +531,7 @@ def _explain_why_driven(
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
-    """Return True if the model has moving parts that are not among the flying ones."""
+    """Return True if only some of the model's moving parts fly."""
     momenta = next(
         (candidate for candidate in history.momenta if candidate.parts is not None),
         None,

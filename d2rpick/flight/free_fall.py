@@ -32,31 +32,34 @@ if TYPE_CHECKING:
 # An acceleration within this relative deviation is gravity: a load comes so close by chance in 1 of 200 cases.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Rounding that hides a fraction of the momentum hides 10 times that of its change, since damping is fitted too.
+# Rounding error of the fitted change of momentum, in rounding errors of the momentum; fitting damping amplifies it.
 _REACH_OF_DIGITS = 10.0
 # Tolerances for recognising gravity while a load fades: 5 % in size, direction cosine 0.999 with an axis.
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# Damping of 20 % of the momentum in a window is accepted if 5 % of the largest momentum remains.
+# If damping takes more than the first share of the momentum in a window,
+# at least the second share of the largest momentum must remain.
 _DAMPED, _LEFT = 0.2, 0.05
 # Largest share of the momentum that damping takes between two states.
 _SHOWN = 0.1
 # Deviation allowed in a window without loads, as a share of the largest momentum and of its range.
-# A fading load may cause this deviation, so the momentum may change by twice as much from end to end.
-# If only some of the moving parts are tried, TOLERANCE applies, because the rest of their body acts on them.
+# A fading load may cause this deviation, and the momentum may then change by twice as much over the window.
+# If only some of the moving parts are tried, TOLERANCE is used instead, because the rest of their body acts on them.
 _ENOUGH = 3e-3
-# Limits for gravity across a load of constant direction: the deviation across the load is within 2 times the rounding,
-# an axis has a component of at least 10 % across it, and the deviation along the load is 30 times as large.
+# Three limits for finding gravity at right angles to a load of constant direction.
+# First: largest deviation at right angles to the load, in rounding errors.
+# Second: smallest component of an axis at right angles to the load.
+# Third: the deviation along the load must be at least this many times as large.
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# A fading force falls to this share from the first to the last third of a window,
-# and to this share of the weight at the end.
+# First: a fading force falls to this share of its size from the first to the last third of a window.
+# Second: at the end a fading force is at most this share of the weight.
 _FADED, _LITTLE = 0.6, 0.02
 # Largest momentum across the direction of a straight motion, as a share of the momentum.
 _STRAIGHT = 0.01
-# A change of momentum is ignored up to this many times the error of a window.
+# A change of momentum up to this many times the error in a window is treated as zero.
 _UNSEEN = 2.0
-# Relative error of the work of gravity in written energies, because of distant states and sums over time steps.
+# Relative error of the work of gravity, because states are far apart and the solver sums energies over time steps.
 _OF_WORK = 2e-3
-# A mass above that from momenta and kinetic energies by this share must have been written by the solver.
+# A mass that exceeds the lower bound from momenta and kinetic energies by this share was written by the solver.
 _CLEARLY_HEAVIER = 1e-6
 # Fewest states for a fit of work: twice the number of unknowns.
 _LEAST_STATES = 6
@@ -73,7 +76,7 @@ class Laws:
     def __init__(
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
-        """Prepare the laws for the parts in columns ``members``; ``balance`` gives limits if their mass is unknown."""
+        """Prepare the laws for the parts in columns ``members``. The energies ``balance`` bound an unknown mass."""
         time = momenta.time
         momentum = momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
@@ -109,14 +112,14 @@ class Laws:
     def gravity(self, first: int, last: int) -> float | None:
         """Return the acceleration between two states of a flight [length/time^2]: 0 for none, NaN if it is unknown.
 
-        None if what acts there is a brake, or not gravity.
+        None if the force there slows the parts down like a brake, or is not gravity.
         """
         return None if self._braked(first, last) else self._gravity((first, last))
 
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law, and still obey it under a stricter tolerance."""
+        """Return the states around ``td`` that obey a law and keep obeying it when the tolerance is made stricter."""
         return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
@@ -136,7 +139,7 @@ class Laws:
         )
 
     def _braked(self, first: int, last: int) -> bool:
-        """Return True if apparent damping is a brake: too fast for the states, or it leaves almost no momentum."""
+        """Return True if a load stops the parts like strong damping: within a few states, or almost completely."""
         largest, final_size = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
@@ -148,7 +151,7 @@ class Laws:
         )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Return the window around ``td`` with a usual acceleration of gravity, in which a load may fade."""
+        """Return the window around ``td`` in which gravity has a usual size. A fading load may still act in it."""
         time = self.fit.time
         momentum = self.fit.momentum
         first, last = self._around(td)
@@ -186,7 +189,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) along an axis that are found in the momentum across a load of constant direction."""
+        """Yield weights (3,) along an axis, found from the momentum at right angles to a load of constant direction."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -242,7 +245,7 @@ class Laws:
     def _gravity(self, window: tuple[int, int]) -> float | None:
         """Return the acceleration in a window [length/time^2]: 0 if none is seen, None if it is not gravity.
 
-        NaN if neither the mass nor the work tells.
+        NaN if neither the mass nor the work of the force is known.
         """
         start, end = self.fit.time[[*window]].tolist()
         vector = self.fit.gravity(*window)
@@ -296,7 +299,7 @@ class Laws:
         )
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
-            return False  # the solver wrote the mass
+            return False  # the mass is exact because the solver wrote it
         swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
         largest = force / self.mass
         lightest = largest * (1 - swing / float(kinetic[best]))
@@ -331,7 +334,7 @@ class Laws:
 
     @cached_property
     def fall(self) -> bool:
-        """Return True if gravity moves the parts at some time; otherwise something supports them."""
+        """Return True if the parts fall under gravity at some time. If they never do, something supports them."""
         self.fall = (
             False  # preliminary value, because `fall` is used while it is computed
         )
@@ -346,7 +349,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Return True if gravity is seen across the direction of a load at some time."""
+        """Return True if the momentum at right angles to a load shows gravity at some time."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
@@ -357,7 +360,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield values of gravity close to an acceleration: ``known`` values, or the usual ones."""
+    """Yield the gravities close to an acceleration, from the ``known`` values or else from the usual ones."""
     if known is not None:
         yield from (
             gravity
@@ -433,7 +436,7 @@ def find_acceleration_by_work(
 
 
 class FreeFall(Law):
-    """Least-squares fits of free flight to windows of one momentum; the misfit is a momentum."""
+    """Least-squares fits of free flight to windows of one momentum record; the misfit has the unit of a momentum."""
 
     def __init__(self, time: Samples, momentum: Samples) -> None:
         super().__init__(time)
@@ -456,7 +459,7 @@ class FreeFall(Law):
         return self._fitted(first, last)[2]
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
-        """Return the least-squares gravity between two states, by default all, shape (components,) [momentum/time]."""
+        """Return the gravity fitted between two states, by default over all, shape (components,) [momentum/time]."""
         last %= self.time.size
         states = slice(first, last + 1)
         undamped = (

@@ -1,12 +1,12 @@
 """Find flights from the internal energy if better evidence is missing, and refine those from the model's energies.
 
-Alone it is poor evidence and never certain: a mild contact may leave no trace in it.  So the window begins late, and
-ends early if a contact is seen.
+Alone it is poor evidence and never certain, because a mild contact may leave no trace in it.  Therefore the window
+begins late, and ends early if a contact is seen.
 
-Beside better evidence the energy must keep its level, and more must move than the vibration.  A fixed rigid wall does
-no work, so that a crash into it keeps kinetic plus internal energy constant, and two bodies that collide keep their
-momentum.  But pushed parts deform, and parts that spring back gain speed: the internal energy drifts, and the total
-energy does not follow it as it does where damping takes both.
+With better evidence the energy must still keep its level, and more must move than the vibration.  A fixed rigid wall
+does no work, so that a crash into it keeps kinetic plus internal energy constant, and two bodies that collide keep
+their momentum.  But pushed parts deform, and parts that spring back gain speed: the internal energy drifts, and the
+total energy does not follow it as it does if damping takes both.
 """
 
 from __future__ import annotations
@@ -29,12 +29,15 @@ _BAND_RESERVE: Final = 0.25
 # Share of the time before td that is not used for the band. In 45 computed runs the energy entered its band too early,
 # by up to 0.3 of that time, while the load still acted.
 _WAIT: Final = 1 / 3
-# A contact leaves the central 80 % of the energy range for a moment. It changes the energy at least twice as fast
-# as the vibration does in the last quarter before td; a decaying vibration stays below that rate.
+# During a contact the energy leaves its central range for a moment; the first share is cut off at each end.
+# A contact changes the energy faster than the vibration does in the second share of the time before td,
+# by the third factor at least. A decaying vibration stays below that rate.
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# The level is the mean over this share of the quiet time; it changes if it leaves its band, widened by its width.
+# The level is the mean energy over this share of the quiet time.
+# The level has changed once the mean leaves its band, widened by the band's width.
 _LEVEL: Final = 1 / 8
-# A landing is detected from this share of the time before it, if the energy has turned at least 4 times there.
+# First: a landing is detected by comparison with this share of the time before it.
+# Second: the energy must have at least this many turning points in that time.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
@@ -44,20 +47,20 @@ _ROUND_OFF: Final = 1e-6
 # The energy band of the last quarter of a flight, widened by this share of its width, contains all earlier energies.
 _RESERVE: Final = 0.5
 # The means of the last two quarters differ by less than this share of the band.
-# A steady drift gives 1, a vibration with 3/4 of a period in each quarter gives 0.3.
+# The difference is 1 for a steady drift, and 0.3 for a vibration with 3/4 of a period in each quarter.
 _DRIFT: Final = 0.35
-# A slow vibration has at least this many oscillations with half of the range.
-# Ranges and means of both halves agree to this share; a crash ends after one oscillation.
+# A slow vibration has at least this many turning points with half of the range; a crash ends after one oscillation.
 _SWINGS: Final = 4
+# Ranges and means of both halves of a flight agree to this share.
 _ALIKE: Final = 0.75
-# An energy that falls below 5 % of its peaks belongs to one vibration, which is at rest at the peaks.
-# Next to a permanent deformation an oscillation of 0.1 % is ignored.
+# First: an energy that falls below this share of its peaks belongs to one vibration, which is at rest at the peaks.
+# Second: an oscillation below this share of the energy of a permanent deformation is ignored.
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# A body yields in its first oscillation if its energy rises by 90 % of the way to its later level.
-# The energy must also leave its minimum, within 10 %, as fast as it rises from there (harmonic: 0.7 of that time).
-# If bodies of the model collide later in the flight, the energy stays at its minimum for longer.
+# A body yields in its first oscillation if its energy comes within this share of its later level.
+# The energy may stay within this share of its minimum for at most the second share of the time in which it rises
+# (0.7 for a harmonic motion). It stays there for longer if bodies of the model collide later in the flight.
 _FLAT, _MOST_FLAT = 0.1, 1.0
-# The motion supplies that energy: the sum of both rises by at most this share of it, and may fall by damping.
+# Kinetic energy supplies the energy of yielding, so the sum of both rises by at most this share of that energy.
 _NOT_FROM_MOTION: Final = 0.1
 
 
@@ -170,7 +173,7 @@ def _find_last_excursion(history: History, start: float, td: float) -> float:
 
 
 def _find_last_push(history: History, start: float, td: float) -> float:
-    """Return the last time from ``start`` to td at which the energy changes much faster than shortly before td."""
+    """Return the last time from ``start`` to td when the energy changes much faster than it does shortly before td."""
     inside = find_window(history.time, start, td)
     time = history.time[inside]
     if time.size < FEWEST:
@@ -227,7 +230,7 @@ def _widen_band(values: Samples, share: float) -> tuple[float, float]:
 
 @remember
 def round_off(history: History) -> float:
-    """Return the energy below which an internal energy is round-off compared with the energies of the run [energy]."""
+    """Return the energy below which an internal energy is only round-off of the largest energy of the run [energy]."""
     balance = history.balance
     terms: list[Samples | None] = []
     if balance:
@@ -237,7 +240,7 @@ def round_off(history: History) -> float:
 
 
 def find_largest(*terms: Samples | None) -> float:
-    """Return the largest absolute energy; missing arrays are skipped, and 0 is returned without any [energy]."""
+    """Return the largest absolute energy [energy]. Missing arrays are skipped; without any array it is 0."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
@@ -334,7 +337,7 @@ def rises_as_it_yields(
 
 
 def _sum_later_losses(damped: Samples) -> Samples:
-    """Return the energy that damping takes between each state and the middle of the last quarter, shape (n,)."""
+    """Return the energy that damping takes from each state to the middle of the window's last quarter, shape (n,)."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
@@ -364,7 +367,7 @@ def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None
 
 
 def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
-    """Return True if an energy oscillates slowly about one level, by half of its range and alike in both halves."""
+    """Return True if an energy oscillates slowly about one level, by half of its range and equally in both halves."""
     width = float(np.ptp(energy))
     if width <= least:
         return True
@@ -400,7 +403,7 @@ def _count_large_swings(energy: Samples, least: float) -> int:
 
 
 def has_whole_motion(balance: Balance, start: float, end: float) -> bool:
-    """Return True if a window contains more motion than the vibration that the internal energy shows."""
+    """Return True if a window has more kinetic energy than the vibration in the internal energy accounts for."""
     inside = find_window(balance.time, start, end)
     if (
         balance.kinetic is None

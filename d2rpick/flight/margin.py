@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Least margin as a share of the flight. Landings of 36 computed runs (a car-like structure, a box with a block inside,
-# OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
+# Smallest margin as a share of the flight. A switch moved the landing by up to 2.5 % of the flight
+# in 36 computed runs (OpenRadioss): by up to 1.1 % for a car-like structure, 2.5 % for a box with a block inside.
 LEAST_MARGIN: Final = 0.03
-# Fewest states in which a force is looked for.
+# A force is searched for in at least this many states.
 _FEWEST: Final = 3
-# A contact grazes the body if its force stays below this share of the largest force on the body,
-# or if it changes the momentum by less than this share of the momentum towards it.
+# A contact grazes the body if its force stays below the first share of the largest force on the body,
+# or if it changes the momentum by less than the second share of the momentum towards the contact.
 # The surfaces then slide along each other, so a small position error moves the contact to a much earlier time.
-# A landing takes more: 1/4 at the tip of a slender body, at least 0.27 within the margin in computed cars and boxes.
-# The grazing contact of a computed car took 0.02.
+# A landing changes that momentum by more: by 1/4 at the tip of a slender body, and by at least 0.27 within the margin
+# in computed cars and boxes. The grazing contact of a computed car changed it by 0.02.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 
@@ -50,7 +50,7 @@ def compute_margin(
     place: float | None = None,
     turning: float = 0.0,
 ) -> Margin:
-    """Return the margin before the contact that ends a flight: the given one, or else how much earlier it may come.
+    """Return the margin before the contact that ends a flight: the given one, or else how much earlier this may come.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 

@@ -42,17 +42,18 @@ _VISIBLE = 100
 # A larger set of parts is preferred only if its window is longer by this factor.
 # A part with a large momentum of its own, such as a sled, loosens the tolerance for the other parts.
 _LONGER = 1.1
-# Attached parts are searched in this share of the record before td, on at most this many states.
-# The momenta of a body deviate together from a line by less than the third value: rounding and solver errors.
+# First: share of the record before td that is searched for attached parts. Second: largest number of states used.
+# Third: the momenta of a body, added up, deviate from a straight line by less than this share.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# A sum that decreases by less than this share decreases by rounding.
-# Without this limit a part of almost no mass would be added and removed for ever.
+# A decrease of the summed deviation below this share is treated as rounding error.
+# Without this limit a part of almost no mass would be added and removed endlessly.
 _ROUNDED: Final = 1e-9
 # A set of parts is at rest or held if its final speed is below this share of its largest momentum.
 _HELD = 0.01
-# The part momenta add up to that of the model within this share, unless a rigid body has taken some parts.
+# The part momenta add up to the model's momentum within this share, unless a rigid body has absorbed some parts.
 _ALL_OF_IT: Final = 1e-2
-# A body flies separately for at least this share of the record, with a velocity that differs by this share.
+# A body flies separately if it does so for at least the first share of the record,
+# and if its velocity differs by at least the second share.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"
@@ -60,7 +61,7 @@ ALL: Final = "all"
 
 
 def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
-    """Return the momenta that may show a flight, best first: all, or only the named set of flying parts."""
+    """Return the momenta that may show a flight, best first; if a set of flying parts is named, only its momenta."""
     return [candidate for candidate in momenta if candidate.flying] or momenta
 
 
@@ -103,7 +104,7 @@ def find_flight_around(
 def _limit_to_flights_of_bodies(
     momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight
 ) -> FreeFlight | None:
-    """Return the part of a flight in which each body flies: bodies in collision keep their total momentum."""
+    """Return the part of a flight in which each body flies. Bodies that collide keep only their total momentum."""
     for part in find_bodies_apart(momenta, members):
         alone = find_flight_of(momenta, (part,), td)
         if alone is None:
@@ -117,13 +118,13 @@ def _limit_to_flights_of_bodies(
 
 
 def find_bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
-    """Return the parts among ``members`` that fly by themselves at some time, not at the set's velocity."""
+    """Return the parts among ``members`` that fly separately at some time, with another velocity than the set."""
     return _collect_bodies_apart(momenta, *members)
 
 
 @remember
 def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
-    """Return the parts among ``members`` that fly by themselves."""
+    """Return the parts among ``members`` that fly separately, as one list."""
     return tuple(_search_bodies_apart(momenta, members))
 
 
@@ -295,7 +296,7 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 def _find_attached_parts(
     momenta: Momenta, chosen: Sequence[int], td: float
 ) -> tuple[int, ...]:
-    """Return the parts to add so that, before td, the deviations of the momenta from straight lines cancel.
+    """Return the attached parts: with them, the deviations of the momenta from straight lines before td cancel.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
     the bent momenta, and its projector groups the parts of a body.
@@ -317,7 +318,7 @@ def _find_attached_parts(
         return ()
     wider = (
         len(moving) > rests.shape[1]
-    )  # the full set of left vectors would be large; only the right ones are used
+    )  # Only the right singular vectors are used; the full set of left ones would be large.
     left_vectors, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
@@ -429,7 +430,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield sets of parts attached to the heaviest part at some time, without the parts that slide then.
+    """Yield the sets of parts attached to the heaviest part at different times, without the parts that slide then.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
@@ -511,9 +512,9 @@ def _select_heaviest_parts(
 def find_complete_stretches(
     momenta: Momenta, whole: Momenta | None
 ) -> tuple[slice, ...]:
-    """Return the ranges of states in which the part momenta add up to that of the ``whole`` model.
+    """Return the ranges of states in which the part momenta add up to the momentum of the ``whole`` model.
 
-    In the other states a rigid body has taken some of them, and no quantity of a part is used.
+    In the other states a rigid body has absorbed some parts, and no part quantity is used.
     """
     return find_stretches(is_complete(momenta, whole), FEWEST)
 
@@ -521,7 +522,7 @@ def find_complete_stretches(
 def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return an array (n,) that is True if the part momenta add up to that of the whole model.
+    """Return for each state whether the part momenta add up to the momentum of the whole model, shape (n,).
 
     ``before`` is the largest momentum of the whole model in earlier states.
     """

@@ -35,23 +35,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Most states on which rotations are fitted; displacements use all states.
+# Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# Largest relative change of the relative velocity of a loose part.
-# For a part of a body it changes by more if the body turns by 0.01 degrees.
+# The relative velocity of a loose part changes by less than this share.
+# For a connected part it changes by more as soon as the body turns by 0.01 degrees.
 _STEADY: Final = 1e-4
-# Deformation of the other parts, relative to the motion of the part, above which the error is a lower bound.
-# In computed cars with right errors it was at most 0.24; in a public car with errors 3 to 4 times too small 1.1 to 1.4.
+# The error is a lower bound if the other parts deform by more than this share of the part's motion.
+# The share was at most 0.24 in computed cars whose errors were right, and 1.1 to 1.4 in a public car
+# whose errors were 3 to 4 times too small.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Errors below this share of the limit are negligible even if they are three times as large.
+# Errors below this share of the limit are negligible, even if they are 3 times too small.
 _HARDLY: Final = 0.01
-# Largest position error as a share of the path of the body. It is 1/3 of the margin before a contact,
-# which is 3 % of the flight, the range in which landings of computed runs moved.
+# Largest acceptable position error as a share of the path of the body: 1/3 of the margin before a contact.
+# That margin is 3 % of the flight, because landings of computed runs moved by up to that much.
 MOST_OF_PATH: Final = 0.01
 
 
 class Drift:
-    """Displacement of a body over the flight caused by parts that move relative to it, as differences from tr to td.
+    """Displacement of a body during the flight, caused by parts that move relative to it. It changes from tr to td.
 
     Attributes
     ----------
@@ -88,7 +89,7 @@ class Drift:
 
     @cached_property
     def at_least(self) -> bool:
-        """Return True if errors and angles are lower bounds, since inner motion looks like motion of the body.
+        """Return True if errors and angles are lower bounds, because internal motion looks like motion of the body.
 
         This is so if the part moves slowly, or if the motion of the others turns their frame by more than the body's
         own angle, or, without a deck, moves them by a notable share of the part's motion.
@@ -128,7 +129,7 @@ class Drift:
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
-        """Return the lengths of vectors (k, 3), NaN outside the flight."""
+        """Return the length of each vector (k, 3), and NaN for times outside the flight."""
         inside = (
             (tr >= self.time[0])
             & (tr <= self.time[-1])
@@ -143,7 +144,7 @@ class Drift:
 
 
 def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None:
-    """Find the displacement of a body in flight relative to a rigid body.
+    """Find how a body in flight is displaced relative to the rigid body that replaces it.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
     a constant rate; together they have at most half of the mass.
@@ -219,7 +220,7 @@ def _integrate_displacements(
 def _compute_offsets(
     time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
 ) -> Samples:
-    """Return how far each moving part displaces the others if no more parts fly, shape (n, moving, 3) [length]."""
+    """Return how far each moving part displaces the others if no other parts fly, shape (n, moving, 3) [length]."""
     frame_parts = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = (
@@ -248,7 +249,7 @@ def find_drift_in_flight(
 def find_parts_apart(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return those of ``parts``, or of the parts to be switched, that separate from the others in the flight.
+    """Return the parts, among ``parts`` or the parts to be switched, that separate from the others in the flight.
 
     The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
@@ -284,7 +285,7 @@ def find_parts_apart(
 def _collect_flying(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
-    """Collect the input of a drift; None if the part momenta do not show the flight."""
+    """Collect the flying parts and their momenta for `find_drift`; None if the part momenta do not show the flight."""
     momenta = next(
         (candidate for candidate in history.momenta if candidate.parts is not None),
         None,
@@ -345,7 +346,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies of a flight with their displacements; ``told`` are those of a deck, empty if one body is assumed.
+    """Rigid bodies of a flight with their displacements. ``told`` lists the deck's bodies, empty if one is assumed.
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them.
@@ -380,7 +381,7 @@ class Bodies:
         )
 
     def compute_speed_at_front(self, direction: Samples) -> float:
-        """Return what the rotation adds to the speed along a unit vector (3,) where a body is farthest along it.
+        """Return the speed along a unit vector (3,) that the rotation adds at the point of a body farthest along it.
 
         Of several bodies the least counts [length/time]; 0 if a deck does not show how each of them turns.
         """

@@ -1,4 +1,4 @@
-"""Find the steady rotation of a flying body from the displacements of its parts from its centre.
+"""Find the steady rotation of a flying body from the displacements of its parts relative to its centre.
 
 In a body that turns at a constant rate each part moves on a circle.  Displacements less these circles are the motion of
 the parts against each other, in a frame that turns with the body.  The moving parts are those without which the others
@@ -26,32 +26,33 @@ _SHOWN: Final = 0.25
 # Most Gauss-Newton steps; a dozen steps reach full precision from a good start.
 _MOST_STEPS: Final = 25
 # Finite-difference step of the rate, as a share of one turn over the record.
-# It is also the tolerance of the iteration for the rate and for the gain of a step.
+# The iteration stops if the rate changes, or a step improves the fit, by less than this share.
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Directions with squared lever arms below this share of the others cannot be determined: they lie along the axis.
+# A rotation about an axis cannot be determined if the squared lever arms about it are below this share of the others.
 _ALONG_AXIS: Final = 1e-6
 # Numbers of periods to try: steps of 1/20 up to two periods, then steps of 10 %.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
-# Number of parts tried as the moving one, by each of two criteria for the unexplained displacements.
+# Each of two criteria proposes this many parts as the next moving part.
 _TRIED: Final = 2
-# Largest unexplained displacement without the next moving part, as a share of that with it.
+# A part is the next moving part if leaving it out reduces the unexplained displacement to this share or less.
 _MORE_RIGID: Final = 0.5
-# Shares of the parts' r^2 below this are ignored: 0.1 % of the displacements.
+# Unexplained sums of m r^2 below this share are ignored, which is 0.1 % of the displacements.
 _NOTHING: Final = 1e-6
-# A rotation that moves the other parts by 10 % of the part's motion changes the displacement by at most as much.
+# A rotation that moves the other parts by less than this share of the part's motion is ignored,
+# because it changes the displacement by at most this share.
 _NOTABLE_WAY: Final = 0.1
 # The rotation of a body is unknown if a single part has more than this share of its mass.
 _MOST_OF_BODY: Final = 0.95
-# Parts below this share of the mass are not tried, because they hardly move the others.
+# Parts with less than this share of the mass are not tried, because they hardly move the others.
 _HEAVY: Final = 0.05
 
 
 def _fit_steady_rotation(
     time: Samples, ways: Samples, masses: Samples, least: float
 ) -> tuple[Samples, float]:
-    """Find the constant rate of rotation that best explains the displacements of a body's parts about its centre.
+    """Fit the constant rate of rotation that best explains how a body's parts are displaced about its centre.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def _fit_steady_rotation(
 
 
 def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
-    """Return the displacements (n, parts, 3) in the rotating frame, without circular motion at a rate and mean.
+    """Return the displacements (n, parts, 3) in the rotating frame, without their mean and the circular motion.
 
     The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """
@@ -170,7 +171,7 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
 
 
 def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
-    """Return the m r^2 of the other parts about their own centre without rotation, for each part (parts,)."""
+    """Return, for each part left out, the sum of m r^2 of the other parts about their own centre, shape (parts,)."""
     return np.asarray(
         _sum_without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
@@ -179,7 +180,7 @@ def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
 
 
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    """Estimate the part of that sum that a rotation of the other parts leaves unexplained (parts,).
+    """Estimate, for each part left out, the sum of m r^2 that no rotation of the others explains, shape (parts,).
 
     In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
     integrals: linear in the rate, with normal equations from which one part is easily removed.
@@ -197,14 +198,14 @@ def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samp
 
 
 def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
-    """Sum quadratic terms (parts, ...) over all parts but one, about the centre of the summed parts."""
+    """Sum quadratic terms (parts, ...) over all parts but one, about the centre of the others, for each part."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
 def _list_linear_terms(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
-    """Return each part's linear equations: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
+    """Return each part's least-squares system: squares (parts,), right-hand side (parts, 3), matrix (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
     bent_places, arm = (
         remove_line(time, values).reshape(ways.shape)
@@ -233,7 +234,7 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
     across = np.array(
         [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    )  # across @ v is the cross product axis x v
+    )  # the product across @ v is the cross product of axis and v
     return np.asarray(
         np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
     )
@@ -242,7 +243,7 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
 def find_moving_parts(
     time: Samples, ways: Samples, mass: Samples
 ) -> tuple[list[int], Samples, float]:
-    """Find the parts that move relative to the others, the rotation of the others, and the unexplained sum."""
+    """Find the parts that move relative to the others, the rotation of the others, and the unexplained sum of m r^2."""
     moving: list[int] = []
     rate = np.zeros(3)
     misfit = np.inf
@@ -257,7 +258,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """A part left out: the rotation of the others, their unexplained sum, and their displacement by the part."""
+    """Fit without one part: the rotation of the others, their unexplained sum, and how far the part displaces them."""
 
     part: int
     rate: Samples
@@ -270,8 +271,8 @@ def _find_next_moving_part(
 ) -> _Apart | None:
     """Find the part whose removal makes the others most nearly rigid.
 
-    A slide of one part may look like a rotation of all; among parts alike in this, the one with the largest effect
-    counts.
+    If one part slides, all parts may seem to rotate.  Among parts that are equally good, the one with the largest
+    effect is chosen.
     """
     about = _subtract_centre(ways[:, left], mass[left])
     masses = mass[left]
@@ -342,7 +343,7 @@ def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
 
 
 def has_clear_rotation(mass: Samples) -> bool:
-    """Return True if the rotation of the body is still found without any one of its heavy parts."""
+    """Return True if the rotation of the body is still found when any one of its heavy parts is left out."""
     if mass.size < 3:
         return False
     columns = np.arange(mass.size)

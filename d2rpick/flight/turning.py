@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 # Largest deviation of the parts from their positions in the rotated deck, relative to the size of the body.
 # A body that is bent more, or placed elsewhere, has no orientation to 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Most states of the integration; positions are linear between them, as vibration hardly rotates a body.
+# Largest number of states in the integration. Positions are interpolated linearly: vibration hardly rotates a body.
 _STATES: Final = 2000
-# The body frame uses connected parts with this share of the body's mass, or else all parts that do not move.
+# Connected parts define the body frame if they have this share of its mass, else all parts that do not move.
 _MOST: Final = 0.5
-# The angular velocity at the end is the mean over this part of the flight, in which vibration hardly counts.
+# The final angular velocity is the mean over the last 1/10 of the flight, which averages out the vibration.
 _LAST: Final = 10
-# Parts lie on a line if a moment of inertia is below this share of the others.
+# Parts are treated as lying on a line if one moment of inertia is below this share of the others.
 _ALONG_LINE: Final = 1e-9
 
 
 class Turning(NamedTuple):
-    """Result of one integration over a flight: arrays over ``time`` (n,), in the frame of the body.
+    """Rotation of a body, from one integration over a flight: arrays over ``time`` (n,), in the frame of the body.
 
     ``place`` (n, 3) is the body's displacement against the centre of mass of all flying parts, as far as the parts that
     become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
@@ -87,7 +87,7 @@ class Turning(NamedTuple):
         )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements of that body, (k, 3) in its own frame [length]."""
+        """Return the displacements of a body that is rigid from ``tr`` on, (k, 3) in its own frame [length]."""
         at_td = np.array([td])
         slid = _interpolate_at(self.time, self.place, at_td) - _interpolate_at(
             self.time, self.place, tr
@@ -251,7 +251,7 @@ def _solve_turning(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Integrate the equation of psi: return its propagation matrix, its particular part, and the effect of I(tr)."""
+    """Solve the equation of psi: return its propagation matrix, its particular solution, and the effect of I(tr)."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = (
         np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))
@@ -259,7 +259,7 @@ def _solve_turning(
     )
     kept_rate = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # angular momentum in the frame at rest
+    )  # angular momentum in the fixed frame
     momentum = kept_rate @ frames  # angular momentum in the frame of the body
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light
@@ -295,7 +295,7 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 
 
 def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
-    """Return the rotations (n, 3, 3) that bring a shape (parts, 3) nearest to each of ``where`` (n, parts, 3)."""
+    """Return the rotations (n, 3, 3) that best map a shape (parts, 3) to the positions ``where`` (n, parts, 3)."""
     left_vectors, _, right_vectors = np.linalg.svd(
         np.einsum("p,npi,pj->nij", mass, where, shape)
     )
@@ -354,12 +354,12 @@ def _compute_inertia(second: Samples) -> Samples:
 
 
 def _integrate_spin(places: Samples, mass: Samples) -> Samples:
-    """Return the integral over each step of the parts' angular momentum, (n - 1, 3): twice the swept areas."""
+    """Return the parts' angular momentum integrated over each step (twice the swept areas), shape (n - 1, 3)."""
     return np.asarray(np.einsum("p,npi->ni", mass, np.cross(places[:-1], places[1:])))
 
 
 def _make_cross_matrices(vectors: Samples) -> Samples:
-    """Return matrices (n, 3, 3) whose product with a vector is the cross product of ``vectors`` (n, 3) with it."""
+    """Return the cross-product matrices (n, 3, 3): matrix i times u is the cross product of ``vectors[i]`` and u."""
     return np.asarray(np.cross(vectors[:, np.newaxis], np.eye(3)).transpose(0, 2, 1))
 
 

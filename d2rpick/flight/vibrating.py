@@ -1,4 +1,4 @@
-"""Find what vibrates together in a flight: further parts next to the chosen ones, and their kinetic energy."""
+"""Find the parts that vibrate with the chosen ones in a flight, and their kinetic energy."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Parts vibrate with the chosen ones if their energy changes by more than this share of the chosen parts' range.
+# Other parts vibrate with the chosen ones if their energy varies by more than this share of the chosen parts' range.
 _HARDLY: Final = 0.02
-_FEWEST: Final = 16  # fewest states that separate a fall from a vibration
+_FEWEST: Final = 16  # fewest states from which a fall and a vibration can be separated
 
 
 class Beside(NamedTuple):

@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# Initial tolerance of free flight, as a share of the range over the record; a contact exceeds it at once.
+# First tolerance for a free flight, as a share of the range over the record. A contact exceeds it at once.
 TOLERANCE = 1e-3
 # Any smooth motion obeys a law for a moment, and its misfit grows with the cube of time or faster.
-# At 1/10 of the tolerance such a window shrinks to less than half, a free flight hardly shrinks.
-# Therefore the tolerance is divided by 10 while the window stays, down to the resolution of the numbers.
+# At 1/10 of the tolerance such a window shrinks to less than half, whereas a free flight hardly shrinks.
+# Therefore the tolerance is divided by 10 while the window keeps its length, down to the resolution of the numbers.
 # A smoothly fading load shrinks the window too, until the tolerance is below the rest of the load.
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # A vibration leaves at least this share of the window's misfit in its middle half (a smooth load leaves 1/8).
 _RINGS = 1 / 3
-# Shortest window as a share of the record, and fewest states.
+# A flight lasts for at least the first share of the record, and has at least the second number of states.
 SHORTEST, FEWEST = 0.05, 12
-# The misfit of the middle of a window, without this share at each end, belongs to the free flight itself.
-# The whole window may have 1.5 times the part due to digits, which is bounded.
-# It may have 3 times the unbounded rest, whose maximum is taken over more states and a longer time.
+# The middle of a window, without the first share at each end, has the misfit of the free flight itself.
+# In the whole window the misfit due to printed digits, which is bounded, may be larger by the second factor.
+# Any other misfit may be larger by the third factor, since its maximum is taken over more states and a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of any quantity: solvers sum in single precision.
 ROUND_OFF = 1e-7
 # Every fifth of these times is a mark from which long flights are searched.
 _FAR: Final = 5
-# Most repetitions: a shrinking window leaves the contacts behind, so it soon stays.
+# Largest number of repetitions. A window that shrinks soon contains no contact and keeps its length.
 _MOST_SHRINKS = 8
 
 
@@ -116,7 +116,7 @@ def find_lasting_window(
     enough: float = 0.0,
     rings: bool = False,
 ) -> tuple[int, int] | None:
-    """Find the states around ``td`` that obey the law, and still obey it under a stricter tolerance.
+    """Find the states around ``td`` that obey the law and keep obeying it when the tolerance is made stricter.
 
     Parameters
     ----------
@@ -126,11 +126,11 @@ def find_lasting_window(
     extent, noise : float
         Range over the record, and the error of printed digits, in the unit of the misfit.
     fades : bool
-        Continue to finer limits, at which alone a smoothly fading load shows.
+        Continue to finer limits, because a smoothly fading load is visible only at these.
     enough : float
         Share of the range that a window may leave although it still shrinks.
     rings : bool
-        Accept a window whose misfit is as large in its middle: a vibration, which no law of free flight describes.
+        Accept a window whose misfit is as large in its middle, as that of a vibration is.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def find_lasting_window(
     window, room, from_start = states
     first, last = _tighten_window(law, window, rounding, room)
     if first == 1 and from_start:
-        first = 0  # a solver may write the first state before its first step, with velocities of half a step earlier
+        first = 0  # The solver may write the first state before its first step, with earlier velocities.
     if time[first] <= td <= time[last] and _is_long_enough(time, (first, last)):
         return (first, last)
     return None
@@ -171,7 +171,7 @@ def _find_converged_window(
     *,
     rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
-    """Find the window around the state ``at`` that hardly shrinks at 1/10 of the tolerance, or None.
+    """Find the window around the state ``at`` that hardly shrinks if the tolerance is divided by 10; None without any.
 
     The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
     returned: the misfit that the window may leave, and whether it first began with the record.
@@ -185,7 +185,7 @@ def _find_converged_window(
     while _is_long_enough(time, window):
         strict = _TIGHTER * limit + noise
         finer = find_longest_window(law, at, strict)
-        if enough:  # a fading load is steady at one end of the window
+        if enough:  # with a fading load only one end of the window moves
             ends = (find_longest_window(law, end, strict) for end in window)
             finer = max(finer, *ends, key=lambda states: _measure_length(time, states))
         share = _measure_length(time, finer) / _measure_length(time, window)
@@ -215,7 +215,7 @@ def _find_converged_window(
 
 
 def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
-    """Return True if the misfit in the middle half is nearly that of the window; a smooth load leaves 1/8 there."""
+    """Return True if the misfit in the middle half of a window is nearly as large as in the whole: a vibration."""
     quarter = (window[1] - window[0]) // 4
     return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
         *window
@@ -229,7 +229,7 @@ def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
 
 
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
-    """Return first and last state of the longest window around the state ``at`` with a misfit below ``room``.
+    """Return the first and last state of the longest window around the state ``at`` whose misfit is below ``room``.
 
     Near an end of the flight a short window may reach across it.  The side grown first decides, so both orders are
     tried.
@@ -270,7 +270,7 @@ def find_all_windows(
     for moment in list_moments(time):
         if not flights or moment > flights[-1].end:
             flight = around(moment)
-            if flight:  # within the tolerance it may begin some states before the last flight has ended
+            if flight:  # within the tolerance a flight may begin some states before the previous one has ended
                 flights.append(
                     flight._replace(start=max(flight.start, flights[-1].end))
                     if flights
@@ -309,7 +309,7 @@ def _tighten_window(
 def _cut_off_hidden_push(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
-    """Cut off the rest of a push at the ends of a window that is hidden by the tolerance ``room``.
+    """Cut off the ends of a window in which the tolerance ``room`` may hide the end of a push.
 
     The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
     room takes as long as from there to its end.  Less than one state cannot be resolved.
@@ -340,7 +340,7 @@ def _measure_length(time: Samples, window: tuple[int, int]) -> float:
 
 
 def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
-    """Walk from ``start`` towards ``limit`` in doubling steps while they fit, then bisect the last step."""
+    """Find the farthest index from ``start`` towards ``limit`` that fits: double the step, then bisect the last one."""
     sign = 1 if limit > start else -1
     good = start
     step = 1
@@ -364,7 +364,7 @@ def limit_to_unheld(
     parts: Sequence[Part] | None,
     td: float,
 ) -> FreeFlight | None:
-    """Return the part of a flight around ``td`` [time] in which the parts, or the model, are not held."""
+    """Return the part of a flight around ``td`` [time] in which no support holds the parts or the model."""
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None

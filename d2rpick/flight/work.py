@@ -20,30 +20,31 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Fewest states that separate a load from gravity and damping: twice the number of unknowns.
+# Fewest states from which a load, gravity and damping can be separated: twice the number of unknowns.
 FEWEST_STATES: Final = 6
 # Relative error of the work of gravity from sampling and the sums of the solver; contacts change more.
 _OWN_ERROR: Final = 1e-3
-# If no velocity is written, damping changes the parabola of the work of gravity by this share.
+# Relative deviation from a parabola that damping may cause in the work of gravity, if no velocity is written.
 _BENT: Final = 1e-2
-# The mass follows from kinetic energy and velocity; states with less than this squared share of speed are left out.
+# The mass follows from kinetic energy and velocity. States are left out
+# if their squared speed is below this share of the largest one.
 _SLOW: Final = 1e-2
-# Factor on that mass, an upper bound: a table may contain the kinetic energy of the chosen parts only.
-# A load that works like gravity without moving the model exceeds it by orders of magnitude.
+# Safety factor on that mass: a table may contain the kinetic energy of the chosen parts only.
+# A load that does work like gravity without moving the model would need a mass larger by orders of magnitude.
 _MASS_ERROR: Final = 2.0
-# A deviation below the tolerance of this share of the range of the internal energy shows no work.
+# Tolerance for work, as a share of the range of the internal energy. A smaller deviation shows no work.
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in relative errors of a printed number.
-# Energies, momenta and the mass found from both are rounded; the state with the largest effect decides.
+# Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number.
+# It exceeds 1 because energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# Losses of kinetic energy below the first share are ignored; those above the second are friction, not damping.
-# The relative change of the momentum is half of that.
+# Losses of kinetic energy below the first share are ignored. Losses above the second are friction, not damping.
+# The momentum changes by half of that share.
 _LITTLE, _MUCH = 5e-3, 0.5
 
-# Error of the energy that damping takes by the rate of the vibration, as a share of it.
+# Relative error of the damped energy if it is computed from the damping rate of the vibration.
 _RATE_ERROR: Final = 0.02
 
-# A contact energy within this many times its printed digits shows no contact.
+# A contact energy shows no contact if it varies by less than this many times its rounding error.
 _VISIBLE = 100
 
 
@@ -88,7 +89,7 @@ def compute_work_beyond_gravity(
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Return the largest factor of the integral of F v: the motion has at most the whole kinetic energy."""
+    """Return an upper bound of the mass by which the integral of F v is multiplied, from the kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     if fast.any():
@@ -120,7 +121,7 @@ def _fit_one_sided(
 def _fit_not_negative(
     values: Samples, free: Sequence[Samples], used: Sequence[Samples]
 ) -> tuple[Samples, Samples]:
-    """Return the residual of a fit to ``values``, and the non-negative factors of the columns ``used``."""
+    """Fit the columns ``used`` to ``values``: return the residual and the non-negative factors."""
     used_columns = list(range(len(used)))
     while True:
         table = np.stack([*free, *(used[i] for i in used_columns)], axis=1)
@@ -133,14 +134,14 @@ def _fit_not_negative(
 
 
 def has_laws(balance: Balance) -> bool:
-    """Return True if the record has work or an energy that obeys a law in free flight."""
+    """Return True if the record contains work or an energy that obeys a law in free flight."""
     return balance.time.size >= FEWEST and bool(_list_terms(balance))
 
 
 def compute_change_of_balance(
     balance: Balance, start: float, end: float
 ) -> float | None:
-    """Return the largest change of kinetic plus internal energy that gravity and damping do not explain.
+    """Return the largest change in kinetic plus internal energy that gravity and damping do not explain.
 
     Errors of digits are subtracted.  None if one of the energies is not written.
     """
@@ -170,7 +171,7 @@ def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
 
 
 def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which only gravity and damping change the energy; else None.
+    """Find the window around ``td`` [time] in which only gravity and damping change the energy; None without any.
 
     The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
     all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy
@@ -193,7 +194,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # the second law also allows a rate, which would hide a load, so the first one is tried first
+    # The second law also allows a rate, which could hide a load, so the first law is tried before it.
     exact, ringing = _make_laws_of_work(balance)
     window = find_lasting_window(exact, td, extent, noise)
     if window is None:
@@ -213,7 +214,7 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
 def list_damped_energies(
     balance: Balance, flight: FreeFlight, momenta: Momenta | None
 ) -> tuple[list[Samples], float]:
-    """Return energies (n,) that only damping lowers in a flight, and the error of their digits [energy].
+    """Return the energies (n,) that only damping lowers in a flight, and their rounding error [energy].
 
     The first is kinetic plus internal energy; the list is empty if a load of unknown size works on the model as well.
 
@@ -241,7 +242,7 @@ def list_damped_energies(
 def _compute_work_of_gravity(
     balance: Balance, flight: FreeFlight, momenta: Momenta
 ) -> Samples:
-    """Return the work of gravity since the first state (n,), from the momentum that it gives the model [energy].
+    """Return the work of gravity since the first state (n,), from the momentum that gravity gives the model [energy].
 
     For a velocity, the mass is the largest one that the written kinetic energy allows.
     """
@@ -335,7 +336,7 @@ def _classify_gravity(balance: Balance, first: int, last: int) -> float:
 
 
 def _list_terms(balance: Balance) -> list[Samples]:
-    """Return the written energies that only gravity and damping change, if they change at all."""
+    """Return the written energies that nothing but gravity and damping changes in free flight."""
     whole = balance.kinetic_and_internal
     internal = balance.internal
     changes = (
@@ -351,9 +352,9 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Energies that are parabolas of time except for damping, which takes a share of the kinetic energy.
+    """Law that energies are parabolas of time, apart from damping, which takes a share of the kinetic energy.
 
-    Solvers know velocities half a step away from places, which adds the rate of the ``internal`` energy, if given.
+    Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """
 
     def __init__(
@@ -385,14 +386,14 @@ class _Parabola(Law):
         )
         scale = 2.0 ** (
             np.frexp(np.abs(self.energies[states]).max())[1] - 1
-        )  # a power of 2 scales exactly; squares of 1e200 would overflow
+        )  # Scaling by a power of 2 is exact; squares of 1e200 would overflow.
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)
 
 
 def has_visible_contacts(balance: Balance) -> bool:
-    """Return True if the contact energy shows that contacts of the model were closed at some time."""
+    """Return True if the contact energy shows that a contact of the model was closed at some time."""
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
         return False
@@ -401,7 +402,7 @@ def has_visible_contacts(balance: Balance) -> bool:
 
 @remember
 def _make_law_of_contacts(balance: Balance) -> Constant:
-    """Return the law that the contact energy stays as it is."""
+    """Return the law that the contact energy is constant."""
     assert balance.sliding is not None
     return Constant(balance.time, balance.sliding[:, np.newaxis])
 

@@ -25,18 +25,18 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# The step takes a quarter of the leading side, and at least one cell, so this is the fewest cells along a side.
+# Minimum number of cells along a side: the step covers a quarter of the leading side, and at least one cell.
 _COARSEST = 4
-# Bars per cell; the cells of the leading side come first, then those of the roof.
+# Number of bars per cell. The cells of the leading side are listed first, then the cells of the roof.
 _BARS = 5
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of box, sled and surroundings in SI units; RangeError for a number without a valid model.
+    """Parameters of box, sled and surroundings in SI units; raise RangeError for a value that gives no valid model.
 
-    The defaults are a narrow box on the standard dolly. Only two times were used to tune them: the trip ends at about
-    85 ms and the box lands at 380 ms, as in the published study, which states no other figure of its model.
+    The defaults are a narrow box on the standard dolly. They were tuned to two times of the published study, which
+    states no other figure of its model: the trip ends at about 85 ms, and the box lands at 380 ms.
     """
 
     speed: float = 7.0
@@ -127,8 +127,8 @@ class Truss(NamedTuple):
 class Structure(NamedTuple):
     """Points at ``places`` (n,) with ``masses``, the first ``of_box`` of them in the box, and all bars.
 
-    The outer ring comes first. ``skin`` are the points that may touch floor and ground, ``toes`` those that may meet
-    the curb.
+    The points of the outer ring are listed first. ``skin`` are the points that may touch floor and ground, ``toes`` the
+    points that may meet the curb.
     """
 
     places: Plane
@@ -208,7 +208,7 @@ def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
 
 
 def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
-    """Return the bars of the step: between its two points, from both to the skin next to them and to points inside."""
+    """Return the bars of the step: between its two points, and from each to nearby points of the skin and inside it."""
     low = 2 * cells
     high = 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]
@@ -223,7 +223,7 @@ def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
 
 
 class Bars:
-    """The present state of the bars of a truss: lengths at ``rest`` with plastic elongation [m], ``plastic_work`` [J].
+    """The current state of a truss's bars: lengths at ``rest`` with plastic elongation [m], ``plastic_work`` [J].
 
     ``points`` is the number of points of the model. A bar depends only on its length, so after a phase in which its
     points moved as one body it continues with the elongation it had, rotated with the body.
@@ -262,7 +262,7 @@ class Bars:
     def elastic_energy(self, positions: Plane, rest: Values | None = None) -> Values:
         """Return the elastic energy of the bars, shape (...) for ``positions`` (..., n) [J].
 
-        ``rest`` are their lengths at rest at that time, if they differ from the present ones (..., bars) [m].
+        ``rest`` are the lengths at rest at that time, if they differ from the current lengths (..., bars) [m].
         """
         length = np.abs(positions[..., self._second] - positions[..., self._first])
         elongation = length - (self.rest if rest is None else rest)
@@ -274,14 +274,14 @@ class Bars:
         rest: Values | None = None,
         plastic_work: Values | None = None,
     ) -> Values:
-        """Return elastic energy plus plastic work of the present or a past state (...) [J]."""
+        """Return the elastic energy plus plastic work of the current or a past state, shape (...) [J]."""
         return self.elastic_energy(positions, rest) + (
             self.plastic_work if plastic_work is None else plastic_work
         )
 
 
 def compute_stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:
-    """Return an upper bound of the angular frequencies of the model [1/s].
+    """Return an upper bound on the angular frequencies of the model [1/s].
 
     A bar of stiffness k between points whose masses are divided among their bars in proportion to the stiffness has
     omega^2 = K_1/m_1 + K_2/m_2, with K the sum of the stiffnesses at a point; no mode of the model is faster than its

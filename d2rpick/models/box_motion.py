@@ -26,36 +26,38 @@ from d2rpick.models.box_model import (
     compute_stiffest_rate,
 )
 
-# Stiffness of floor and curb at one point [N/m]: softer than the box, so that contact does not limit the time step.
-# The weight of the box causes a penetration of 0.5 mm.
+# Stiffness of floor and curb at one point [N/m]. They are softer than the box, so that contact does not limit
+# the time step. The weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
-# Below this sliding speed friction is proportional to it [m/s]: 1/100 of the speeds in the model.
+# Below this sliding speed, friction is proportional to the speed [m/s]. Speeds in the model are 100 times as high.
 SLIP = 0.1
-# Points deeper below the floor than this are outside the sled, not in it [m].
+# A point that is farther below the floor than this has left the sled and does not touch its floor [m].
 DEEPEST = 0.1
-# Thickness of the curb [m], behind which the sled ends.
+# Thickness of the curb, which is the end of the sled [m].
 CURB_THICKNESS = 0.05
-# Bound of the speed towards floor, curb or ground: this many times the initial speed, plus the speed after a fall
-# of 1 m [m/s], plus twice the speed of the drop. It gives the time in which no contact is possible.
+# Upper limit of the speed towards floor, curb or ground, from which follows how long no contact is possible.
+# It is the first value times the initial speed, plus the second value, which is the speed after a fall of 1 m [m/s],
+# plus twice the speed of the drop.
 FASTEST, FALL = 4.0, 5.0
-# Contact forces within this time are one contact [s]: corners rattle, a flight takes longer.
+# Contact forces that are less than this apart belong to one contact [s]: corners rattle, and a flight lasts longer.
 SAME_CONTACT = 2e-3
 
-# Safety factor of the time step on 2/omega, the limit of linear bars, since bars rotate, yield and touch.
+# Safety factor on the time-step limit 2/omega, which holds for linear bars; these bars rotate, yield and touch.
 _SAFETY = 0.9
-# Times within this share of a time step are multiples of it, since they are written as decimals.
+# A time within this share of a time step from a multiple of it is treated as the multiple,
+# because times are written as decimals.
 _SAME = 1e-6
 
 
 class Face(NamedTuple):
-    """Forces of a face on points (n,) [N]: normal to it, and the friction along it."""
+    """Forces that a face exerts on points (n,) [N]: the force normal to it, and the friction along it."""
 
     normal: Plane
     friction: Plane
 
     @property
     def whole(self) -> Plane:
-        """Sum of normal force and friction."""
+        """The sum of normal force and friction."""
         return self.normal + self.friction
 
 
@@ -90,8 +92,8 @@ class Sled:
 class Contact:
     """The contact forces on the points of a structure, with the crushed depth of the cushion as state.
 
-    ``released`` is the time at which the sled pushed last before the ground first did; ``landings`` are the intervals
-    (start, end) in which the ground pushed [s].
+    ``released`` is the last time at which the sled pushed before the first contact with the ground; ``landings`` are
+    the intervals (start, end) in which the ground pushed [s].
     """
 
     def __init__(self, structure: Structure, parameters: Parameters) -> None:
@@ -150,13 +152,13 @@ class Contact:
         )
 
     def _on_all(self, face: Face, points: Ends) -> Face:
-        """Return forces on selected points as forces on all points."""
+        """Return forces on selected points as an array for all points, with zeros for the others."""
         forces = np.zeros((2, self._points), dtype=np.complex128)
         forces[:, points] = face
         return Face(*forces)
 
     def _gap(self, positions: Plane, on_sled: Plane) -> float:
-        """Return the smallest distance that the nearest point must move before it can touch [m]."""
+        """Return the distance of the nearest point from floor, curb and ground [m]."""
         to_ground = float(positions[self._skin].imag.min()) + self._p.ground
         if self._p.drop is not None:
             return to_ground
@@ -180,7 +182,7 @@ class Contact:
         )
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the curb along -x, with friction along z: like a floor rotated by 90 degrees."""
+        """Return the forces of the curb along -x, with friction along z, like a rotated floor."""
         may_touch = (positions.imag < self._p.curb) & (
             positions.real < self._p.cushion_depth + DEEPEST
         )
@@ -201,7 +203,7 @@ class Contact:
 
 
 class RigidPoints:
-    """Points that move as one body, with the momenta that they had at the switch.
+    """Points that move as one rigid body, which keeps the momenta that they had at the switch.
 
     ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
     ``spin`` from x to z [rad/s].
@@ -305,7 +307,7 @@ class BoxMotion:
 
     def make_rigid(self) -> None:
         """Make the box rigid: it keeps its momenta, its vibration stops, and its deformation is frozen."""
-        # a last evaluation, so that yielding bars yield before they are frozen
+        # The forces are evaluated once more, so that bars yield before they are frozen.
         self.box.forces(self.places)
         of_box = slice(self.structure.of_box)
         masses = self.structure.masses[of_box]
@@ -320,11 +322,11 @@ class BoxMotion:
         )
 
     def make_deformable(self) -> None:
-        """Make the box deformable again: the points continue the motion of the body, the bars keep their lengths."""
+        """Make the box deformable again: the points keep the body's velocities, and the bars keep their lengths."""
         self.body = None
 
     def advance(self) -> Plane:
-        """Advance the velocities to half a step past the positions; return their mean over the step, (n,) [m/s]."""
+        """Advance the velocities to half a step after the positions; return their mean over the step, (n,) [m/s]."""
         s = self.structure
         old_velocities = self.velocities
         push = self.contact.push(self.time, self.places, old_velocities)

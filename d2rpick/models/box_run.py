@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Number of states whose results are computed at once: for a single state, numpy calls would take most of the time.
+# Results are computed for this many states at once, because for single states numpy calls would take most of the time.
 _BLOCK: Final = 256
 
-# Default output interval [s]: 25 states in a period of a 400 Hz mode, and not much longer than a time step.
+# Default output interval [s]. A period of a 400 Hz mode has 25 states, and the interval is little longer than a step.
 INTERVAL = 1e-4
-# Limit of time steps, which take minutes; more are hardly intended.
+# Largest number of time steps. They take minutes, and more are probably a mistake.
 MOST_STEPS = 5_000_000
-# Time between the values of tr in a scan [s]: while the load may last, after it, and before td at the end.
-# In the flight the energy vibrates at 40 Hz, twice the lowest mode: six values per period resolve it.
+# Time between values of tr in a scan [s]: first while the load may last, second in the flight, third just before td.
+# In the flight the energy vibrates at 40 Hz, twice the lowest mode. Six values per period resolve this.
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
 class Record(NamedTuple):
-    """States of a run over ``time`` (n,); SI units, vectors x + i z.
+    """States of a run over ``time`` (n,) in SI units; vectors are complex numbers x + i z.
 
     Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s]
     from the angular momentum. Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2). Of
@@ -79,7 +79,7 @@ class Record(NamedTuple):
 
     @property
     def total_energy(self) -> Values:
-        """Present and dissipated energy (n,) [J], as a solver sums it, without the energy lost at tr."""
+        """Sum of current and dissipated energy (n,) [J], as in a solver, without the energy lost at tr."""
         present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
             present + self.friction_energy + self.wall_energy + self.damping_energy
@@ -87,7 +87,7 @@ class Record(NamedTuple):
 
     @property
     def energy_ratio(self) -> Values:
-        """Total energy over initial energy plus external work (n,) [-]; 1 if both are 0."""
+        """Ratio of the total energy to the sum of initial energy and external work (n,) [-]; 1 if both are 0."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
         return np.asarray(
             np.divide(
@@ -100,7 +100,7 @@ class Record(NamedTuple):
 
     @property
     def imbalance(self) -> Values:
-        """Error of the energy balance over the largest total energy (n,) [-]."""
+        """Error of the energy balance as a fraction of the largest total energy (n,) [-]."""
         total = self.total_energy + self.lost_energy
         return np.asarray(
             (total - total[0] - self.external_work + self.external_work[0])
@@ -227,7 +227,7 @@ def _count_updates(motion: BoxMotion) -> int:
 
 @dataclass(frozen=True)
 class RigidWindow:
-    """The box is rigid from ``tr`` to ``td`` [s]; RangeError unless 0 <= tr <= td."""
+    """The interval from ``tr`` to ``td`` [s] in which the box is rigid; raise RangeError unless 0 <= tr <= td."""
 
     tr: float
     td: float
@@ -256,7 +256,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # the number of time steps below shows an overflow
+    # An overflow shows in the number of time steps, which is checked below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -279,7 +279,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid = {motion.step_at(window.tr) for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
-    # the recorder refuses infinite numbers
+    # No warnings, because the recorder raises an error for infinite numbers.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
@@ -323,10 +323,10 @@ def make_history(record: Record) -> History:
 class Outcome(NamedTuple):
     """One switched run compared with the reference run.
 
-    ``energy`` [J] of the box at tr, which is locked in; ``energy_ratio`` of it to the energy at td. At td:
-    ``roll_error`` [degrees], ``x_error``, ``z_error`` [m] of the centre of mass, ``omega_error`` [rad/s].
-    ``lost_energy`` [J] of the vibration at tr. ``mean_ratio`` of the mean energy of the box from td to the landing to
-    that of the reference.
+    ``energy`` is the energy of the box at tr, which is locked in [J], ``energy_ratio`` its ratio to the energy at td.
+    The errors at td are ``roll_error`` [degrees], ``x_error`` and ``z_error`` of the centre of mass [m], and
+    ``omega_error`` [rad/s].  ``lost_energy`` is the kinetic energy of the vibration at tr [J].  ``mean_ratio`` is the
+    ratio of the mean energy of the box from td to the landing to the same mean in the reference run.
     """
 
     tr: float
@@ -341,7 +341,7 @@ class Outcome(NamedTuple):
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Return times for tr up to td [s]: dense until 1.5 times the end of the load, then dense enough for the vibration.
+    """Return times for tr up to td [s], dense until 1.5 times the end of the load and then resolving the vibration.
 
     Raises RangeError if td leaves no time for tr.
     """
@@ -357,7 +357,10 @@ def scan_times(released: float, td: float) -> list[float]:
 
 
 def find_comparison_end(reference: Record, td: float) -> float:
-    """Return when the comparison after ``td`` ends [s]: at the landing or with the record; RangeError from then on."""
+    """Return when the comparison after ``td`` ends: at the landing or the end of the record [s].
+
+    Raise RangeError if ``td`` is not before that time.
+    """
     end = float(reference.time[-1]) if reference.landed is None else reference.landed
     if not td < end:
         raise RangeError(f"td {td:g} is not before the end of the flight at {end:g}")
@@ -373,8 +376,8 @@ def scan(
 ) -> Iterator[Outcome]:
     """Yield the outcome of a switched run for each of ``times``, in the order of tr.
 
-    All runs are the reference until their tr, so that part is computed once; then ``jobs`` processes share the runs
-    (None: one for each core; 1: this one).
+    All runs equal the reference run until their tr, so that part is computed only once.  Then ``jobs`` processes share
+    the runs (None: one process for each core; 1: only this process).
     """
     end = find_comparison_end(reference, td)
     ready: dict[int, Record] = {}

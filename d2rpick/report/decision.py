@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
-    """Return what to do with a pair, why, and how to improve it, as pairs of a name and a sentence."""
+    """Return what to do with a pair, why, and how to improve it, as (name, sentence) pairs."""
     lines = [
         (decision.verdict, f"tr = {tr:.6g}, td = {td:.6g}"),
         ("why", decision.reason),
@@ -34,7 +34,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and one on the vibration, without what the verdict already says."""
+    """Return a sentence on the motion and a sentence on the vibration; both omit what the verdict already says."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -82,7 +82,7 @@ def format_rigid_time(best: Candidate) -> str:
 
 
 def format_accuracy(best: Candidate) -> str:
-    """Return the accuracy and the timing tolerance of tr as text, empty if neither is known."""
+    """Return the accuracy and the timing tolerance of tr as text; an empty text if neither is known."""
     interval = (
         "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
     )
@@ -94,11 +94,11 @@ def format_accuracy(best: Candidate) -> str:
 
 
 def format_saving(best: Candidate) -> str | None:
-    """Return how much CPU time the pair saves, None if the cost of the parts is unknown."""
+    """Return how much CPU time the pair saves; None if the cost of the parts is unknown."""
     share = best.run_time_share
     return None if share is None else format_saved_share(share)
 
 
 def format_saved_share(run_time_share: float) -> str:
-    """Return how much CPU time is saved if ``run_time_share`` of it remains."""
+    """Return how much CPU time is saved if the share ``run_time_share`` of it remains."""
     return f"about {1 - run_time_share:.0%} of the CPU time"

@@ -37,7 +37,7 @@ _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps o
 
 
 def as_table(answer: Driven, display: DisplayOptions) -> str:
-    """Return the rigid windows, the CPU time of the restart segments, and what was saved."""
+    """Return the rigid windows, the CPU time of the restart segments, and the savings as text."""
     parts = [
         tables.as_text(*list_window_rows(answer), display.width)
         if answer.windows
@@ -94,7 +94,7 @@ def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 
 def list_savings(answer: Driven) -> list[tuple[str, str]]:
-    """Return the savings and remarks, as pairs of a name and a sentence."""
+    """Return the savings and remarks, as (name, sentence) pairs."""
     words = zip(
         answer.saved,
         ("by the cost model", "by the CPU time of its engine runs"),

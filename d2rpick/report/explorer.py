@@ -1,7 +1,7 @@
 """Build the interactive part of a page, which updates everything that depends on td when the user changes td.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.  ``explorer.html`` holds the elements
-that every page has.
+Python computes all numbers and texts; the script in ``explorer.js`` only looks them up.  ``explorer.html`` contains
+the elements that every page has.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of intervals for which the lowest and highest energy is drawn, in the view and in the overview.
+# Number of intervals whose lowest and highest energies are drawn, in the view and in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
 # Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
@@ -68,9 +68,9 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "admissible tr",
     "reason": "no tr",
 }
-# Number of columns in which windows of acceptable tr are drawn; must be a multiple of eight.
+# Number of columns into which the view is divided to draw windows of acceptable tr. It must be a multiple of 8.
 _COLUMNS: Final = 480
-# significant digits of a difference
+# number of significant digits of a difference
 _READ: Final = 3
 
 
@@ -80,7 +80,7 @@ def read_styles() -> tuple[Markup, ...]:
 
 
 def read_scripts() -> tuple[Markup, ...]:
-    """Return the scripts in loading order; that of uPlot includes its licence."""
+    """Return the scripts in loading order; the uPlot script includes its licence."""
     licence = join([Markup("/*!\n"), read_resource("uplot/LICENSE"), Markup("*/\n")])
     return Markup(licence + read_resource("uplot/uPlot.iife.min.js")), read_resource(
         "explorer.js"
@@ -98,7 +98,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
     flights = [_describe_flight(trade_off) for trade_off in explored.trade_offs]
     known_values = {
         name for flight in flights for name in flight["texts"]
-    }  # values that no pair has are left out
+    }  # Values that are unknown for all pairs are left out.
     listed = (
         make_element(
             "div", make_element("dt", name), make_element("dd", data_value=key)
@@ -206,7 +206,7 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
 
 
 def _list_motion_curves(situation: Situation) -> dict[str, Any] | None:
-    """Return the curves from which the script composes the deformation, None if no oscillator is known."""
+    """Return the curves from which the script composes the deformation; None if no oscillator is known."""
     motion = compute_response(situation)
     if motion is None:
         return None
@@ -227,7 +227,7 @@ def _round_curve(values: Samples) -> list[float]:
 
 
 def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
-    """Return one row per td, with the column names once: ``numbers`` for curves, ``texts`` to be shown with them.
+    """Return one row per td under a single header: ``numbers`` are drawn as curves, ``texts`` are shown next to them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """
@@ -268,7 +268,7 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
 
 
 def _compute_saved_percentage(offer: Offer) -> float | None:
-    """Return the saving of a pair [%]: of the CPU time, or of the simulated time without part costs."""
+    """Return the share of the CPU time that a pair saves [%]; if part costs are unknown, the rigid share of the run."""
     share = offer.saving
     if offer.best and share is None:
         share = offer.best.rigid_fraction
@@ -276,9 +276,9 @@ def _compute_saved_percentage(offer: Offer) -> float | None:
 
 
 def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch, as a bit mask in hexadecimal digits; empty without a window.
+    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty without a window.
 
-    The mask stays short however many windows noise makes, and it is finer than the screen.
+    The mask has the same length for any number of windows, of which noise makes many, and is finer than a screen.
     """
     ends = np.array([(window.start, window.end) for window in windows]).reshape(-1, 2)
     first, last = (
@@ -295,7 +295,7 @@ def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
 
 
 def _round_number(value: float | None) -> float | None:
-    """Round a number that is only drawn."""
+    """Round a number that is drawn but not printed."""
     return None if value is None else float(f"{value:.6g}")
 
 
@@ -307,7 +307,7 @@ def _name_error(offers: Sequence[Offer]) -> str:
 
 
 def _name_saving(offers: Sequence[Offer]) -> str:
-    """Return the label of the other axis: saved CPU time, or the rigid time if the cost of the parts is unknown."""
+    """Return the label of the saving: saved CPU time, or the rigid time if the cost of the parts is unknown."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
         return "saved, % of the CPU time"
@@ -372,7 +372,7 @@ def _format_for_screen_reader(offer: Offer) -> str:
 
 
 def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
-    """Describe the loss and gain of an offer compared with the offer shown first."""
+    """Describe what an offer gains and loses compared with the offer that is shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td

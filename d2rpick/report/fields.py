@@ -1,4 +1,4 @@
-"""Define the fields of results: each key once, with its kind, its meaning and the source of its value.
+"""Define the fields of results: the kind, the meaning and the source of the value of each key.
 
 A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
 ``d2rpick/schemas``.  Keys are only ever added.
@@ -15,10 +15,10 @@ from d2rpick.report import tables
 
 
 class Kind(NamedTuple):
-    """The kind of values of a key: ``schema`` describes it to a validator, ``plain`` converts a value to JSON.
+    """A type of field values: ``schema`` is its JSON schema, ``plain`` converts a value to JSON.
 
-    Within ``schema`` other kinds stand for their schemas; a kind with a ``name`` becomes a definition that others refer
-    to.  A row (an object) has ``fields`` in display order.
+    Within ``schema``, other kinds are replaced by their schemas.  A kind with a ``name`` becomes a definition to which
+    others refer.  The kind of an object (a row) has ``fields`` in display order.
     """
 
     schema: Mapping[str, Any]
@@ -28,13 +28,13 @@ class Kind(NamedTuple):
 
     @property
     def keys(self) -> list[str]:
-        """Names of the fields: the columns of a CSV file or a frame."""
+        """Names of the fields, which are the columns of a CSV file or a data frame."""
         return [field.key for field in self.fields]
 
     def of_part(
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
-        """Return the fields with these ``keys``, or all fields, reading from the object that ``part`` returns."""
+        """Return the fields with these ``keys``, or all fields; they read from the object that ``part`` returns."""
         return [_read_from_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:
@@ -42,7 +42,7 @@ class Kind(NamedTuple):
         return next(field for field in self.fields if field.key == key)
 
 
-# Kinds that many fields use; with a question mark they may be None. A size is a non-negative number.
+# Kinds that many fields use. A name with a question mark also allows None. A "size" is a non-negative number.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -62,11 +62,11 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Return the field's value of an object in its JSON form."""
+        """Return the value of this field in an object, in its JSON form."""
         return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
-        """Return the field's value as it is in the object."""
+        """Return the value of this field in an object, unchanged."""
         if self.get:
             return self.get(thing)
         if isinstance(thing, Mapping):
@@ -87,7 +87,7 @@ def row(
     closed: bool = False,
     **keywords: Any,
 ) -> Kind:
-    """Make a row of fields; older results may lack keys given as ``later``, a ``closed`` row allows no other keys.
+    """Make a row of fields. Older results may lack the keys in ``later``; a ``closed`` row allows no other keys.
 
     ``more`` is added to its schema unchanged.
 
@@ -116,7 +116,7 @@ def row(
 
 
 def get_kind(kind: Kind | Name, **limits: Any) -> Kind:
-    """Return a kind by its name, with limits in the words of JSON schema, such as ``minimum=0``."""
+    """Return a kind by its name, with limits given as in JSON schema, such as ``minimum=0``."""
     named_kind = _KINDS[kind] if isinstance(kind, str) else kind
     if limits:
         return Kind({**named_kind.schema, **limits}, named_kind.plain, named_kind.name)
@@ -141,7 +141,7 @@ def maybe(kind: Kind | Name) -> Kind:
 
 
 def many(kind: Kind | Name) -> Kind:
-    """Return the kind of an array of such values."""
+    """Return the kind of an array of values of the given kind."""
     item_kind = get_kind(kind)
     return Kind(
         {"type": "array", "items": item_kind},
@@ -150,12 +150,12 @@ def many(kind: Kind | Name) -> Kind:
 
 
 def each(kind: Name) -> Kind:
-    """Return the kind of an object with any keys whose values all have the given kind."""
+    """Return the kind of an object with arbitrary keys, whose values all have the given kind."""
     return Kind({"type": "object", "additionalProperties": get_kind(kind)}, dict)
 
 
 def one_of(*names: str) -> Kind:
-    """Return the kind of a word that must be one of ``names``."""
+    """Return a kind that allows only the words in ``names``."""
     return Kind({"enum": list(names)})
 
 
@@ -176,10 +176,10 @@ _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.i
 
 
 class Document(NamedTuple):
-    """A result as JSON: the ``name`` of its schema, its description, and the fields after schema, version and command.
+    """A result as JSON: the ``name`` of its schema, a description, and the fields after schema, version and command.
 
-    Objects of a ``closed`` document have no other keys; its schema defines ``also`` the objects in other forms of the
-    result.
+    Objects of a ``closed`` document have no other keys.  ``also`` lists objects of other forms of the result, which the
+    schema defines too.
     """
 
     name: str
@@ -190,7 +190,7 @@ class Document(NamedTuple):
 
     @property
     def whole(self) -> Kind:
-        """All fields of the document as one row."""
+        """A row of all fields of the document."""
         head = (
             Field("schema", Kind({"const": self.name})),
             Field("tool_version", "text"),
@@ -206,7 +206,7 @@ class Document(NamedTuple):
         return row(*head, *self.row.fields, later=later, **further_keys)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
-        """Return the content of the JSON document; ``command`` are the arguments that repeat the answer."""
+        """Return the content of the JSON document; ``command`` lists the arguments that repeat the answer."""
         head = {
             "schema": self.name,
             "tool_version": __version__,
@@ -217,14 +217,14 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer by its schema; without ``indent`` in one line, which can be joined to those of other runs."""
+        """Write an answer in the form of its schema. Without ``indent`` it is one line, for newline-delimited JSON."""
         return tables.as_json(self.of(answer, command), indent)
 
 
 def write_csv(
     keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; "
 ) -> str:
-    """Write rows as CSV with these columns; lists are joined in their cell."""
+    """Write rows as CSV with these columns; the items of a list share one cell."""
     return tables.as_csv(
         keys, ([_make_cell(values[key], between) for key in keys] for values in rows)
     ).rstrip("\n")

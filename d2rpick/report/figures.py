@@ -35,24 +35,25 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Colour of what has no verdict: admissible times, rigid windows of a finished run.  Green, yellow and red are verdicts.
+# Colour of items without a verdict, such as admissible times and rigid windows of a finished run.
+# Green, yellow and red are used for verdicts.
 NEUTRAL: Final = "#595959"
 # width of a figure in a file [inch]
 WIDTH: Final = 10.0
-# Largest width of the label of a switch time as a share of the axes, by whether the figure is on a page.
+# Largest width of the label of a switch time, as a share of the axes: in a file (False) and on a page (True).
 LABEL: Final = {False: 0.14, True: 0.28}
-# From this ratio on, a logarithmic axis has enough marks at powers of ten; further marks cost time.
+# If the values span at least this ratio, marks at powers of ten suffice on a logarithmic axis; more marks cost time.
 _DECADES: Final = 100.0
-# Number of intervals for which a curve's lowest and highest value is drawn; paper and screens show no more.
+# Number of intervals whose lowest and highest values are drawn as a curve. Paper and screens show no more.
 STRETCHES: Final = 400
-# Longest name from a file in a legend [letters]; the result contains it in full.
+# Longest name from a file in a legend [letters]. The result contains the whole name.
 _LONGEST_NAME = 28
 
-# Width of a figure on a page [inch]. On a phone it fills the screen, with letters of the size of the page.
-# On a wider page the letters are no larger than those of the page.
+# Width of a figure on a page [inch]. On a phone the figure fills the screen, with letters as large as in the text.
+# On a wider page its letters are no larger than in the text.
 PAGE_WIDTH: Final = 4.5
-# Space [inch] above the panels for labels of switch times, between panels, and on the right for half a number,
-# below for numbers and name of the time axis, for a line of the legend, and beside the name of the vertical axis.
+# Space around the panels [inch]: above for labels of switch times, between two panels, on the right for half a number,
+# below for the time axis, for each line of the legend, and next to the name of the vertical axis.
 _TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
 # height of the letters of an axis name [inch]
 _NAME: Final = 0.16
@@ -69,7 +70,7 @@ class Figure(figures.Figure):
 
 
 def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]:
-    """Create a figure of axes below each other that share their time axis; ``height`` [inch] applies to a file."""
+    """Create a figure of axes below each other with a common time axis; ``height`` is its height in a file [inch]."""
     figure = Figure(figsize=(WIDTH, height), layout=None if page else "constrained")
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
@@ -98,7 +99,7 @@ def note(
 
 
 def choose_picture_format(name: str) -> str:
-    """Return the format for the suffix of ``name``; raise FormatError unless it is png, svg or pdf."""
+    """Return the picture format that the suffix of ``name`` denotes; raise FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
         raise FormatError(
@@ -108,7 +109,7 @@ def choose_picture_format(name: str) -> str:
 
 
 def render(figure: figures.Figure, name: str) -> bytes:
-    """Return the bytes of the file ``name`` in the format of its suffix; a figure always gives the same bytes."""
+    """Return the content of the picture file ``name`` in the format of its suffix; equal figures give equal bytes."""
     content = io.BytesIO()
     form = choose_picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
@@ -159,7 +160,7 @@ def show_span(
     for peak_name, highest in above:
         if highest <= scale.high:
             continue
-        early = peak_name == "load"  # the load is on the left, the landing on the right
+        early = peak_name == "load"  # the load is left, the landing right
         note(
             axes,
             f"{peak_name}, up to {highest:.4g} \N{UPWARDS ARROW}",
@@ -175,7 +176,7 @@ def show_span(
 def mark_times(
     panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool
 ) -> None:
-    """Mark the switch times; their labels stand above the first axes, away from each other and from the edges.
+    """Mark the switch times. Their labels are above the first axes, away from each other and from the edges.
 
     A label that would cross an edge moves to the other side of its line if there is room.
     """
@@ -214,7 +215,7 @@ def mark_times(
 def format_axes(axes: Axes, *, legend: bool = True) -> None:
     """Draw the grid, limit the time axis to the data, and put the legend next to the axes.
 
-    The power of ten of the numbers stands above them, clear of the labels of the switch times.
+    The common power of ten is printed above the axes, where it does not touch the labels of the switch times.
     """
     axes.grid(visible=True, linewidth=0.3)
     axes.yaxis.get_offset_text().set_horizontalalignment("right")
@@ -250,7 +251,7 @@ def add_legend_below(
 
 
 def add_unit(name: str, unit: str) -> str:
-    """Return the label of an axis of time, with the unit that a file names, else with that of the run."""
+    """Return the label of a time axis, with the unit that a file names, or else "units of the run"."""
     return f"{name} [{make_plain_text(unit)}]" if unit else f"{name} (unit of the run)"
 
 
@@ -266,7 +267,7 @@ def make_plain_text(name: str) -> str:
 
 
 def place_panels(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
-    """Put panels of one ``height`` [inch] below each other, and one legend for all of them below the last.
+    """Arrange panels of one ``height`` [inch] below each other, and a common legend below the last panel.
 
     Margins are measured once, from the numbers on the vertical axes; a layout engine would draw the figure three times.
     """
@@ -314,7 +315,7 @@ def _place(
 
 
 def render_svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Return a figure as an SVG element for a page, whose ids all begin with ``prefix``; text stays text.
+    """Return a figure as an SVG element for a page. All its ids begin with ``prefix``; text is not drawn as outlines.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """
@@ -332,8 +333,8 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
     element = element[element.index("<svg") :]
     element = re.sub(
         r' (?:width|height)="[\d.]+pt"', "", element, count=2
-    )  # the page sets the width
-    # 0.01 points is finer than any screen
+    )  # no width, because the page sets it
+    # Coordinates are rounded to 0.01 points, which is finer than any screen.
     element = re.sub(
         r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element
     )

@@ -56,19 +56,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Heights of a figure in a file [inch]: of the energy alone, and with the motion; on a page those of each panel.
+# Heights of a figure [inch]: with the energy only, and with the motion too. On a page they belong to each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
 # Largest number of candidates drawn as marks; more are drawn as a band of admissible tr.
 _FEW: Final = 20
-# Height of the band at the bottom of the axes, clear of the curve, as a share of the axes.
+# Height of the band at the bottom of the axes, as a share of the axes. The curve lies above the band.
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a share of their span.
 _BEYOND_FLIGHTS: Final = 0.05
-# Shortest window, as a share of the simulated time, whose label has room for its times.
+# The label of a window contains its times if the window is at least this share of the simulated time.
 _ROOM_FOR_TIMES: Final = 0.2
 
-# Colours of windows by their verdict, as of the badges on pages; windows that wait or are done have their own.
+# Colours of windows by verdict, as in the badges on pages. Windows to be planned again or done have other colours.
 _COLOURS: Final = {
     "use": GOOD,
     "use with care": "#e69f00",
@@ -83,19 +83,21 @@ _HATCHES: Final = {
     "re-plan": "//",
     "done": None,
 }  # line styles that are distinguishable without colour
-# height of the figure in a file, and of the axes on a page [inch]
+# First: height of the figure in a file [inch]. Second: height of the axes on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn; number of parts whose energy is drawn.
+# Share of the axes below the energy in which the windows are drawn.
 _STRIP: Final = 0.07
-# Height of the energy axis over the largest energy shown.
+# Height of the energy axis, as a multiple of the largest energy shown.
 _HEADROOM: Final = 1.1
+# Largest number of parts whose energy is drawn.
+# Largest number of parts whose energy is drawn.
 _MOST_PARTS: Final = 6
-# height of the figure in a file, and of one of its axes on a page [inch]
+# First: height of the figure in a file [inch]. Second: height of one of its axes on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space next to the first and last td, as a share of the axes, so that lines and marks there are complete.
+# Space next to the first and last td, as a share of the axes, so that lines and marks there are not cut off.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Palette of Okabe and Ito, without yellow, which is invisible on white; dashes distinguish lines of one colour.
+# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of one colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,
@@ -106,30 +108,30 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Largest number of runs with colours and names; of more runs only outliers are named, and the others are grey.
+# Largest number of runs that each have a colour and a name. If there are more, only outliers do; the others are grey.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# Many grey curves together are as dark as ``_DARK`` lines, and none is fainter than ``_FAINTEST``.
+# All grey curves together are as dark as the first number of lines, and none is fainter than the second opacity.
 _DARK, _FAINTEST = 10, 0.02
 # with more runs than this, lines and marks are thin
 _MANY: Final = 40
-# Time shown before the first tr and after td, as shares of the time between them.
+# Time shown before the first tr (first) and after td (second), as shares of the time between them.
 _BEFORE, _AFTER = 0.25, 0.15
 # height of the figure [inch]
 _HEIGHT: Final = 4.0
 # height of a name, as a share of the axes
 _LINE: Final = 0.055
-# the line to a name begins at its left edge
+# the line from the curve to a name ends at the left edge of the name
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The lowest level is ignored for the axis if it is this many times lower than the others.
+# The axis need not show the lowest level if that is this many times lower than the median level.
 _LOWEST: Final = 50.0
 
 
 def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
     """Draw the energy in the flight with the target energy, the candidates or admissible windows, and the motion below.
 
-    On a page a better pair is drawn in the same figure, since two figures would be nearly the same.
+    On a page a better pair is drawn into the same figure, since a second figure would look nearly the same.
     """
     best = answer.chosen
     has_few = answer.windows is None and len(answer.candidates) <= _FEW
@@ -187,7 +189,7 @@ def _draw(
     panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
     for panel in panels:
         figures.format_axes(panel, legend=not page)
-    # the level belongs to the flight, even if td is after its end
+    # The level is an energy in the flight, even if td is after the end of the flight.
     scale = make_scale_of_flight(situation, view, [situation.energy_td])
     figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
@@ -276,7 +278,7 @@ def _draw_motion(axes: Axes, motion: ReplayedMotion, energy_unit: str) -> None:
 
 
 def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
-    """Draw the energy over time, with the flights behind it and the rigid windows below it."""
+    """Draw the energy over time on shaded flights, with the rigid windows below the curve."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
     span = float(history.time[-1] - history.time[0])
@@ -319,7 +321,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window supported by this run, or else its next step."""
+    """Return the verdict on a window that this run supports, or else what must be done first."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status
@@ -347,7 +349,7 @@ def _label_window(number: int, window: Times, span: float) -> str:
 def draw_run(
     history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
 ) -> Figure:
-    """Draw the trusted energy of a run, its flights, and the windows in which parts were rigid."""
+    """Draw the energy of a run as far as it can be trusted, its flights, and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     rigid = np.any(
         [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
@@ -447,7 +449,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
 
 
 def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
-    """Draw one measure of all offers, with gaps where it is unknown, and mark the Pareto-optimal offers."""
+    """Draw one measure of all offers, with gaps if it is unknown, and mark the Pareto-optimal offers."""
     td = np.array([offer.td for offer in trade_off.offers])
     drawn = np.array([np.nan if value is None else value for value in values])
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
@@ -466,7 +468,7 @@ class _Named(NamedTuple):
 
 def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
     """Draw the energies of all runs around td, the tr of each run, the common tr, and td."""
-    # the names next to the axes make the margins unknown, on a page too
+    # A layout engine is needed, because names next to the axes make the margins unknown.
     figure = Figure(
         figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT),
         layout="constrained",
@@ -505,7 +507,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
 def _choose_named_runs(
     runs: Sequence[StudyRow], curves: Mapping[int, Samples]
 ) -> list[_Named]:
-    """Return the runs with their own colour and name: all if there are few, otherwise the outliers."""
+    """Return the runs that get a colour and a name: all runs if there are few, otherwise the outliers."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:
@@ -528,7 +530,7 @@ def _choose_named_runs(
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
-    """Draw the runs without a name in grey, so that many lines are together as dark as ten."""
+    """Draw the runs without a name in grey; all these lines together are at most as dark as ten."""
     named_curves = {id(named_run.curve) for named_run in named_runs}
     other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
     is_thin = len(curves) > _MANY

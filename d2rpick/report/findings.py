@@ -80,8 +80,8 @@ _WINDOW: Final = row(
 class Checks:
     """The findings in several decks; paths below ``root`` are shown relative to it.
 
-    ``failed`` are decks that could not be read.  ``history`` are the files by which the windows were judged, None
-    without any.  Findings lighter than ``fail_on`` are no failures.
+    ``failed`` lists the decks that could not be read.  ``history`` lists the files from which the windows were judged;
+    None without any.  Findings less severe than ``fail_on`` are not failures.
     """
 
     results: Sequence[Checked]
@@ -93,7 +93,7 @@ class Checks:
 
 
 def as_table(checks: Checks, _: DisplayOptions) -> str:
-    """Return the findings and windows of each deck, one per line, and their number, with the number of failed decks."""
+    """Return one line per finding and per window of each deck, then the numbers of findings and of failed decks."""
     lines: list[str] = []
     for result in checks.results:
         lines.append(_format_path(result.deck, checks.root))
@@ -110,7 +110,7 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
-    """Return a line of JSON per deck, each by the schema of the whole result."""
+    """Return one line of JSON per deck; each line has the schema of a complete result."""
     deck_checks = (replace(checks, results=[result]) for result in checks.results)
     return "\n".join(
         DOCUMENT.as_json(deck_check, display.command, None)
@@ -124,7 +124,7 @@ def as_csv(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_markdown(checks: Checks, _: DisplayOptions) -> str:
-    """Return the findings as a Markdown table, and their number."""
+    """Return the findings as a Markdown table, with their number."""
     rows = [list(FINDING.plain(finding).values()) for finding in _list_findings(checks)]
     return "\n\n".join(
         [
@@ -157,8 +157,8 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_junit(checks: Checks, _: DisplayOptions) -> str:
-    """Return a suite per deck and a case per finding; findings lighter than ``fail_on`` pass but show their message."""
-    from xml.etree import ElementTree as ET  # imported here to start faster
+    """Return a suite per deck and a case per finding. Findings less severe than ``fail_on`` pass with a message."""
+    from xml.etree import ElementTree as ET  # Imported here to keep start-up fast.
 
     suites = ET.Element("testsuites", name="d2rpick check")
 
@@ -206,8 +206,8 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
 def _make_sarif_help(rule: Rule) -> dict[str, str]:
     """Return the fix of a rule, and where the documentation explains the rule.
 
-    SARIF wants an absolute address as ``helpUri``; the documentation has none, so its page and anchor are part of the
-    text.
+    SARIF requires an absolute address as ``helpUri``.  The documentation has none, so the text names its page and
+    anchor.
     """
     page = f"docs/reference/rules.md#{rule.id.lower()}"
     command = f"d2rpick rule {rule.id}"
@@ -368,7 +368,7 @@ def _count_severities(results: Sequence[Checked]) -> dict[str, int]:
 
 
 def _summarize_findings(checks: Checks) -> str:
-    """Return the number of findings and decks, and which input was not judged."""
+    """Return the number of findings and decks, and the input that was not judged, as a sentence."""
     results = checks.results
     counted = [
         f"{count} {noun}{'s' * (count != 1)}"
@@ -381,7 +381,7 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display: relative to ``root`` if it lies below it, with ``/``, undecodable bytes replaced."""
+    """Return a path for display, with ``/`` and without undecodable bytes; relative to ``root`` if it is in that."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
@@ -408,7 +408,7 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Return the text in characters that XML 1.0 can write and a terminal shows."""
+    """Replace the characters of a text that XML 1.0 cannot contain or a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
@@ -452,11 +452,11 @@ def _explain_matching_rules(
 
 
 def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
-    """Explain one rule: its finding, its importance, and decks that pass and fail, as wide as their cards.
+    """Explain one rule: what it finds, why that matters, and decks that pass and fail. Lines are as wide as the cards.
 
     Without the decks the last line says how to print them.
     """
-    from textwrap import wrap  # imported here: findings do not need it
+    from textwrap import wrap  # Imported here to keep start-up fast.
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     explained = wrap(rule.explanation, width, break_on_hyphens=False)

@@ -1,6 +1,6 @@
-"""List which result can be written in which form, and write it.
+"""List the forms in which each result can be written, and write it.
 
-Each result has a module in this folder, which is imported only to write it: ``--help`` lists the forms without it.
+Each result has a module in this folder.  It is imported only to write the result, so that ``--help`` starts fast.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")
-# forms of each result; the first is the default
+# The forms in which each result can be written; the first one is the default.
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "suggestion": (*PLAIN, "ndjson", "value"),
     "plan": (*PLAIN, "ndjson", "value"),
@@ -35,7 +35,7 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class DisplayOptions(NamedTuple):
-    """What to show besides the answer: the command, the number of rows, lines already written.
+    """What to show in addition to the answer: the command, the number of rows, and lines that were already written.
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
     and text are no wider than ``width`` columns.
@@ -50,7 +50,7 @@ class DisplayOptions(NamedTuple):
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
-    """Write an answer in one of the forms of its result: by ``as_FORM`` of its module, JSON by its ``DOCUMENT``.
+    """Write an answer in one of its forms: JSON with the ``DOCUMENT`` of its module, others with its ``as_FORM``.
 
     Examples
     --------

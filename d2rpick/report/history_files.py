@@ -1,4 +1,4 @@
-"""Write histories of the sample models as files: as tables of any columns, or as databases of a solver."""
+"""Write histories of the sample models to files: as tables with any columns, or as solver databases."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     """Return the format for a file name: csv without a name; raise FormatError if the name does not determine one.
 
-    The suffix decides.  A name without a known suffix must be or contain the name of a solver's database.
+    The suffix determines the format.  A name without a known suffix must be or contain the name of a solver's database.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
     >>> [choose_history_format(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
     ['csv', 'glstat', 'hdf5', 'csv']
     """
-    from pathlib import PurePath  # imported here to start faster
+    from pathlib import PurePath  # Imported here to keep start-up fast.
 
     if name is None:
         return "csv"
@@ -74,7 +74,7 @@ def _make_oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
 
 
 def _make_oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
-    """Return a matsum of the parts frame, suspended mass and spring with their energies and momenta."""
+    """Return a matsum with energies and momenta of three parts: frame, suspended mass and spring."""
     frame = oscillator.frame_mass
     suspended = oscillator.mass
     state = motion.state
@@ -98,9 +98,9 @@ def _make_oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes
 def _make_box_table(record: Record) -> Table:
     """Return the columns of the box, the total momentum of box and step, and the energy balance of the model.
 
-    Internal and kinetic energy are those of the box, so that switch times of the box can be chosen from them.  Separate
-    columns hold the energies of the step, the terms of contacts and walls (see `Record`) and the work done.  The total
-    is the sum of all but the work.
+    Internal and kinetic energy belong to the box, so that switch times of the box can be chosen from them.  Separate
+    columns contain the energies of the step, the terms of contacts and walls (see `Record`) and the work done.  The
+    total energy is the sum of all columns except the work.
     """
     energies = record.internal_energy.T, record.kinetic_energy.T
     flying = record.momentum.sum(axis=1)
@@ -118,10 +118,10 @@ def _make_box_table(record: Record) -> Table:
 
 
 def _make_box_glstat(record: Record) -> bytes:
-    """Return a glstat of box and step: energies, work exchanged with sled, curb and ground, and the mean velocity.
+    """Return a glstat of box and step: the energies, the work exchanged with the surroundings, and the mean velocity.
 
     The rigid walls of the model are floor, curb and ground, see `Record`.  Friction on them is part of the contact
-    energy and is also listed separately, like in Radioss, since health needs the contact energy without friction.
+    energy and is also listed separately, as in Radioss, since health needs the contact energy without friction.
     """
     internal = record.internal_energy.sum(axis=1)
     kinetic = record.kinetic_energy.sum(axis=1)
@@ -144,7 +144,7 @@ def _make_box_matsum(record: Record) -> bytes:
     """Return a matsum of box and step; while the box is rigid, its values are those of the rigid-body motion."""
     from d2rpick.models.box_run import (
         PARTS,
-    )  # imported here: tables do not need the model
+    )  # Imported here to keep start-up fast.
 
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
@@ -162,7 +162,7 @@ def _list_writers(
     glstat: Callable[..., bytes],
     matsum: Callable[..., bytes],
 ) -> Mapping[str, Callable[..., bytes]]:
-    """Return the writer of each format, from functions that make a table, a glstat or a matsum."""
+    """Return the function that writes each format, given functions that make a table, a glstat or a matsum."""
     tables = {
         form: lambda run, *_, form=form: write_table(form, table(run))
         for form in TABLES

@@ -1,4 +1,4 @@
-"""Define the fields shared by several results: of a candidate, the history, its health, and the situation at td.
+"""Define the fields that several results share: for a candidate, the history, its health, and the situation at td.
 
 Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
@@ -93,7 +93,7 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# position of the rigid body at td, estimated from single parts
+# fields on the position of the rigid body at td, which is estimated from single parts
 _POSITION: Final = (
     Field("position_error", "size?",
           "position error of a rigid body at td, caused by a part that is frozen in another position [length]; for "
@@ -108,7 +108,7 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Values of a candidate besides its parts; in CSV the notes come last. Add a new measure at the end.
+# All values of a candidate except its parts. In CSV the notes are the last column. Add a new measure at the end.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -148,7 +148,8 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# Values that explain tr but do not measure the pair, and the measures that ``verify`` shows first, in order.
+# First: keys that explain the choice of tr but do not rate the pair.
+# Second: the ratings that ``verify`` shows first, in their order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
@@ -175,7 +176,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys added after the first schemas of ``suggest`` and ``verify``, but in the others from the start.
+# Keys that were added to ``suggest`` and ``verify`` after their first schemas. Other results always had them.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -276,14 +277,14 @@ class Read(Protocol):
 
     @property
     def name(self) -> str:
-        """Name as the user gave it."""
+        """The file name as given by the user."""
 
     def sha256(self) -> str:
         """Return the SHA-256 digest of the content."""
 
 
 def _list_files_once(files: Iterable[Read]) -> dict[str, Read]:
-    """Return the files by name; a file that is included twice occurs once."""
+    """Return the files by name. A file that is included twice is listed once."""
     return {file.name: file for file in files}
 
 
@@ -300,7 +301,7 @@ FILES: Final = (
 
 
 def _get_history_holder(answer: Any) -> RunPlan | Situation:
-    """Return the plan or situation of an answer, which holds the history and the settings."""
+    """Return the plan or situation of an answer, which contains the history and the settings."""
     holder: RunPlan | Situation = (
         answer if hasattr(answer, "settings") else answer.situation
     )
@@ -312,7 +313,7 @@ def _get_weights(answer: Any) -> Weights | None:
     return used.weights if used else None
 
 
-# fields with which the JSON of every answer about a history begins
+# The JSON output of every answer about a history begins with these fields.
 FRAME: Final = (
     WARNINGS,
     Field("history", HISTORY, get=lambda answer: _get_history_holder(answer).history),
@@ -326,7 +327,7 @@ FRAME: Final = (
 
 
 def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Return the fitted oscillator, or None if none was searched for."""
+    """Return the fitted oscillator; None if no oscillator was searched for."""
     fit = situation.evidence.fit
     if fit is None:
         return None
@@ -341,7 +342,7 @@ def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
 
 
 def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Return the modes on which the choice is based, or None if it is not based on modes."""
+    """Return the modes on which the choice is based; None if it is not based on modes."""
     modal = situation.vibration.modal
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 

@@ -92,7 +92,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 ))  # fmt: skip
 _MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# keys of the JSON output with a single value
+# keys of the JSON output whose value is not a list or an object
 _PLAIN = (
     "format",
     "version",
@@ -106,7 +106,7 @@ _PLAIN = (
 
 
 def as_table(overview: Overview, display: DisplayOptions) -> str:
-    """Return whether the run can be used, why, and the next command; then a line per fact, and the parts."""
+    """Return as text whether the run can be used, why, and the next command; then a line per fact, and the parts."""
     lines = tables.format_in_line(list_overview_lines(overview))
     if overview.health and (health := _list_health_rows(overview)):
         lines += [
@@ -128,7 +128,7 @@ def as_table(overview: Overview, display: DisplayOptions) -> str:
 
 
 def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
-    """Return whether the run can be used, why, its flights, and the next command, as pairs of a name and a sentence."""
+    """Return whether the run can be used, why, its flights, and the next command, as (name, sentence) pairs."""
     lines = [("verdict", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
@@ -200,7 +200,7 @@ def as_csv(overview: Overview, _: DisplayOptions) -> str:
 
 
 def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
-    """Return each fact as a pair of its name and value."""
+    """Return each fact as a (name, value) pair."""
     sampling = overview.sampling
     rows: list[tuple[str, tables.Cell]] = [
         ("source", ", ".join(overview.source)),
@@ -226,7 +226,7 @@ def list_facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
 
 
 def _list_health_rows(overview: Overview) -> list[list[tables.Cell]]:
-    """Return the health measures that the files contain, with the limits of good practice."""
+    """Return the health measures that the files contain, each with its limit according to good practice."""
     if overview.health is None:
         return []
     verdicts = {True: "within limit", False: "exceeded", None: None}

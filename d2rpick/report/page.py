@@ -1,4 +1,4 @@
-"""Build HTML pages: elements from nested calls, which escape all other text, and shared sections.
+"""Build HTML pages: elements, made by nested calls that escape all text, and sections that several pages share.
 
 Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
@@ -34,29 +34,29 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# smallest number of sections with which a page has a list of its contents
+# a page with at least this many sections has a table of contents
 _LONG: Final = 4
 # tables with more columns do not fit on a narrow screen
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# control characters that no page may contain, and those that change the direction of the surrounding text
+# Characters that change the direction of the surrounding text. No page may contain them or control characters.
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
 _MOST_FILES: Final = 20  # largest number of files of a deck that are named
-# lines of a page to be filled in by hand
+# names of the lines of a page that are filled in by hand
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
-# CSS class of the card and badge of each verdict
+# for each verdict the CSS class of its card and badge
 CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 class Markup(str):
-    """Text that is HTML already."""
+    """Text that is already HTML and needs no escaping."""
 
     __slots__ = ()
 
@@ -69,7 +69,7 @@ class PageSection(Markup):
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Return an element; attributes like Python keywords end in an underscore, and ``_`` stands for ``-`` in names.
+    """Return an element. In attribute names ``_`` stands for ``-``; a final underscore avoids a Python keyword.
 
     Examples
     --------
@@ -106,9 +106,9 @@ def build_document(
     styles: Sequence[Markup] = (),
     scripts: Sequence[Markup] = (),
 ) -> str:
-    """Return a whole page that needs no other file, with lines ``signed`` to be filled in by hand.
+    """Return a complete page that needs no other file; the lines ``signed`` are to be filled in by hand.
 
-    ``styles`` and ``scripts`` are needed besides the style of every page; the policy of the page blocks all others.
+    ``styles`` and ``scripts`` are added to the common style of all pages; the policy of the page blocks all others.
     """
     sheets = (read_resource("style.css"), *styles)
     if any("<pre" in part for part in content):
@@ -127,7 +127,7 @@ def build_document(
         make_element("title", title),
         *(make_element("style", sheet) for sheet in sheets),
     )
-    # at the top, next to the times: after a long card it might be printed on a separate sheet
+    # The lines are at the top, because below a long card they might be printed on a separate sheet.
     sign = make_element(
         "p", *(make_element("span", line) for line in signed), class_="sign"
     )
@@ -150,8 +150,8 @@ def build_document(
 def _make_policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     """Return the content security policy: nothing is fetched, and only the page's own scripts and styles are used.
 
-    This holds whatever the input files contain.  Drawings have their styles as attributes.  Older browsers know only
-    one rule for all styles.
+    This applies whatever the input files contain.  Drawings have their styles in attributes.  Older browsers support
+    only one rule for all styles.
     """
     allowed = {"style-src-elem": styles, "script-src": scripts}
     rules = [
@@ -184,7 +184,7 @@ def _make_section(title: str, *content: str) -> PageSection:
 
 
 def build_contents(content: Iterable[str]) -> Markup:
-    """Return links to the sections of a page, nothing if it is short."""
+    """Return a table of contents with links to the sections of a page; nothing if the page is short."""
     sections = [part for part in content if isinstance(part, PageSection)]
     if len(sections) < _LONG:
         return Markup()
@@ -206,7 +206,7 @@ def build_drawing(caption: str, svg: str) -> Markup:
 
 
 def build_remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """Return a list of reasons and warnings, nothing if there are none."""
+    """Return a list of reasons and warnings; nothing if there are none."""
     lines = [make_element("li", reason) for reason in reasons]
     lines += [
         make_element("li", make_element("b", caution.code), f": {caution.message}")
@@ -226,7 +226,7 @@ def build_scrolling_table(
     rows: Iterable[Sequence[Cell]],
     marked: int | None = None,
 ) -> Markup:
-    """Return a table in a box that scrolls sideways if needed; keyboard users reach it by its ``title``."""
+    """Return a table in a box that scrolls sideways if needed; its ``title`` identifies it for keyboard users."""
     box = make_element(
         "div",
         build_grid(head, rows, marked),
@@ -245,9 +245,9 @@ def build_scrolling_table(
 def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Return a bare table in which the row ``marked`` is highlighted.
+    """Return a table without a box, in which the row ``marked`` is highlighted.
 
-    Columns of numbers are aligned right.  Lines break only at blanks, never within a number.
+    Columns of numbers are right-aligned.  Lines break only at blanks, never within a number.
     """
     body = [list(row) for row in rows]
     is_number = [
@@ -286,7 +286,7 @@ def _build_cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
 
 
 def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Return a list of names and descriptions, nothing if there are none."""
+    """Return a list of names and descriptions; nothing if there are none."""
     listed = [
         make_element("div", make_element("dt", name), make_element("dd", text))
         for name, text in rows
@@ -301,7 +301,7 @@ def _replace_markup(text: str, *, quote: bool = True) -> str:
 class Explorer(NamedTuple):
     """The trade-offs of one or several flights, to be explored on a page.
 
-    ``command`` is the command line that asks for the pair at a td, as its words before and after the value of td.
+    ``command`` has the words of the command line for a td, those before and those after the value of td.
     """
 
     trade_offs: tuple[TradeOff, ...]
@@ -328,7 +328,7 @@ class PageContext(NamedTuple):
 
 
 def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:
-    """Return the first section: cards of the chosen or judged pairs next to each other, and remarks below."""
+    """Return the first section: the cards of the chosen or judged pairs next to each other, with remarks below."""
     return make_element("section", make_element("div", *cards, class_="choice"), *below)
 
 
@@ -359,7 +359,7 @@ def build_pair_card(
     history: History,
     class_: str,
 ) -> Markup:
-    """Return the card of (tr, td): the times large, a description of the pair, and the times with all digits."""
+    """Return the card of (tr, td): the times in large type, a description of the pair, and the exact times."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     large_times = (
         make_element("span", make_element("i", name), f"{format_short(time)}{unit}")
@@ -387,7 +387,7 @@ def build_verdict_card(
     history: History,
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
-    """Return the card of a verdict: ``title``, the verdict as a badge, the times large, and the reason."""
+    """Return the card of a verdict: ``title``, the verdict as a badge, the times in large type, and the reason."""
     kind = CLASSES[decision.verdict]
     badge = make_element("span", decision.verdict, class_=f"badge {kind}")
     _, *why = list_verdict_lines(decision, *times)
@@ -408,7 +408,7 @@ def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
 def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """Return the digests of a deck, its main file first, and of a file of weights; long lists are cut."""
+    """Return the digests of a deck's files, beginning with the main file, and of the weights; long lists are cut."""
     files = list({file.name: file for file in deck}.values())
     hidden_count = len(files) - _MOST_FILES
     if hidden_count > 0:
@@ -425,13 +425,13 @@ def list_deck_digests(
 
 
 def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
-    """Return the digests of the deck that an answer uses, nothing without a deck."""
+    """Return the digests of the deck that an answer uses; nothing without a deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
 
 
 def build_mismatch_table(candidate: Candidate | None) -> Markup:
-    """Return a table of each part's contribution to the mismatch of a pair, nothing if the parts are unknown."""
+    """Return a table of each part's contribution to the mismatch of a pair; nothing if the parts are unknown."""
     if candidate is None or not candidate.parts:
         return Markup()
     sign = {True: "same", False: "opposite", None: "unknown"}
@@ -474,7 +474,7 @@ def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup
 
 
 def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
-    """Return the arguments that repeat an answer as a command line to paste."""
+    """Return the arguments that repeat an answer as a command line that can be pasted into a shell."""
     stdin_note = (
         [make_element("p", "with the same history on standard input:")] if stdin else []
     )
@@ -488,7 +488,7 @@ def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
 def build_solver_input(
     decision: Decision, times: tuple[float, float], record: PageContext
 ) -> Markup:
-    """Return the D2R card of a pair, or the command that prints it; folded below the verdict "do not use"."""
+    """Return the D2R card of a pair, or the command that prints it; collapsed if the verdict is "do not use"."""
     title = "Solver input"
     contents = _list_solver_input(times, record)
     if decision.verdict != DO_NOT_USE:

@@ -1,4 +1,4 @@
-"""Write answers as HTML: pages to be read, printed and signed, and displays in notebooks."""
+"""Write answers as HTML: pages that are read, printed and signed, and displays in notebooks."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# Most rows of a table on a page: more cannot be compared by eye, and CSV and JSON have all.
+# Largest number of rows of a table on a page. More cannot be compared by eye; CSV and JSON contain all rows.
 _MOST_ROWS = 20
 
-# Most rows of a table in a notebook.
+# Largest number of rows of a table in a notebook.
 _FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # a picture without a width fills the screen
+_WIDEST: Final = "max-width: 40em"  # without this limit a picture would fill the screen
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
-    """Write a page about one run, with its script if something can be explored."""
+    """Write a page about one run, with its script if the trade-offs can be explored."""
     needed = (
         {"styles": read_styles(), "scripts": read_scripts()} if record.explorer else {}
     )
@@ -102,7 +102,7 @@ def _draw_suggestion(answer: PairSuggestion) -> Markup:
 def _build_starred_table(
     title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> Markup:
-    """Return a table without its first column; a star there marks the recommended row, which is highlighted instead."""
+    """Return a table without its column of stars; the recommended row, which has the star, is highlighted instead."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
@@ -132,7 +132,7 @@ def _build_lower_sections(
 
 
 def _build_choice(answer: PairSuggestion) -> Markup:
-    """Return the section above the figures: the pairs in large type, and remarks."""
+    """Return the section above the figures: the pairs of times in large type, and remarks."""
     cards = [_build_recommendation(answer)]
     better = answer.clearly_better
     if better:
@@ -380,7 +380,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
-    """Return the outcome without the contents of the card of the common tr."""
+    """Return the common results of the runs, without those on the card of the common tr."""
     outcome = study.list_outcome(answer)
     return outcome if answer.common.tr is None else outcome[1:]
 
@@ -545,7 +545,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
     )
 
 
-# For each kind of answer: sentences, the shortest first, and the header and rows of its table.
+# For each kind of answer, its sentences (the shortest first), and the header and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
@@ -590,7 +590,7 @@ def give_sentence(kind: str, answer: Any) -> str:
 
 
 def summarise_files(run: OpenedRun) -> str:
-    """Return a summary of a run: files, format, states, times and parts, as far as its files are readable."""
+    """Return a summary of a run's files, format, states, times and parts, as far as the files are readable."""
     first = run.databases[0]
     time = give_if_written(lambda: first.time if first.channels else first.part_time)
     facts = [" + ".join(database.format for database in run.databases)]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Columns of the sets, and of the parts in two tables: as many as fit next to each other on a screen or sheet.
+# Columns of the table of sets and of the two tables of parts, as many as fit on a screen or sheet.
 SETS = (
     "set",
     "parts",
@@ -89,7 +89,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# the behaviour of a part in flight is that in the longest flight
+# The fields on a part's behaviour in flight describe the longest flight.
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -151,11 +151,11 @@ _FLIGHT: Final = row(
     Field("start", "number"), Field("end", "number"), Field("longest", "flag")
 )
 _MOST_SHOWN = 6
-# Columns that are left out, in this order, if a terminal is too narrow.
+# Columns that are omitted, in this order, if a terminal is too narrow.
 _SPARE: Final = ("material", "step", "mass", "saved per step", "rotated [deg]")
-# Verdicts on parts, for people.
+# Displayed verdicts on parts.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
-# Names of the sets, for people.
+# Displayed names of the sets.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
     "all but what moves": "all eligible parts but loose ones",
@@ -267,12 +267,12 @@ def as_csv(answer: Parts, _: DisplayOptions) -> str:
 
 
 def as_value(answer: Parts, _: DisplayOptions) -> str:
-    """Return the part ids of the recommended set in the form of ``--part``, nothing if none is recommended."""
+    """Return the part ids of the recommended set in the form of ``--part``; nothing if no set is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
 def list_heading(answer: Parts) -> list[tuple[str, str]]:
-    """Return the input, as pairs of a name and a description."""
+    """Return descriptions of the input, as (name, description) pairs."""
     run = answer.files
     deck = answer.inventory
     formats = " + ".join(database.format for database in run.databases)
@@ -307,7 +307,7 @@ def list_heading(answer: Parts) -> list[tuple[str, str]]:
 def build_part_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the names and cells of all or some columns of the parts, with a star for parts of the recommended set."""
+    """Return header and rows of a table of parts with some columns; parts of the recommended set have a star."""
     best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.fill_table(
@@ -318,7 +318,7 @@ def build_part_table(
 def build_set_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the names and cells of all or some columns of the sets, with a star for the recommended set."""
+    """Return the header and rows of a table of sets, with all or some columns; the recommended set has a star."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
     return tables.fill_table(
         {"": lambda part_set: "*" if part_set.recommended else " ", **columns},
@@ -341,14 +341,14 @@ def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
 
 
 def name_verdict(row: PartRow) -> str:
-    """Return whether to make a part rigid, in one or two words."""
+    """Return in one or two words whether to make a part rigid."""
     if row.merge_with is not None:
         return f"merge with {row.merge_with}"
     return _VERDICTS.get(row.verdict, row.verdict)
 
 
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
-    """Return which parts to make rigid, why, and the next command, as pairs of a name and a sentence."""
+    """Return which parts to make rigid, why, and the next command, as (name, sentence) pairs."""
     best = answer.recommended
     if best is None and answer.inventory is None:
         return [
@@ -392,12 +392,12 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def name_set(part_set: PartSet) -> str:
-    """Return the name of a set for people."""
+    """Return the displayed name of a set."""
     return _SET_NAMES.get(part_set.name, part_set.name)
 
 
 def list_remarks(answer: Parts) -> list[tuple[str, str]]:
-    """Return remarks on the recommended set, and why other sets are not compared, as pairs of a name and a sentence."""
+    """Return remarks on the recommended set, and why other sets are not compared, as (name, sentence) pairs."""
     lines: list[tuple[str, str]] = []
     best = answer.recommended
     if best and best.step_growth is not None and best.step_growth > 1:

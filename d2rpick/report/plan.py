@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
 
 
-# When the window of a flight can be used, by its status.
+# For each status of a window, when the window can be used.
 _WHEN: Final = {
     "supported": "now",
     "re-plan": "after a rerun",
@@ -44,7 +44,7 @@ _POSITION: Final = (
     "position_error_body",
     "position_error_assumes",
 )
-# Columns that are left out first if the table would be too wide.
+# Columns that are omitted first if the table would be too wide.
 _OUT_OF_PLACE: Final = "out of place"
 _SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "error")
 
@@ -58,7 +58,7 @@ def _get_situation(row: PlannedFlight) -> Situation | None:
 
 
 def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
-    """Return a function that reads a value of the margin of a window, unless that window is done already."""
+    """Return a function that reads a value of a window's margin, and returns None if the window is already done."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
@@ -192,7 +192,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return the plan in a sentence, the next command, a row per flight, and reasons with improvements."""
+    """Return the plan in one sentence, the next command, one row per flight, and reasons with improvements."""
     if plan.flights:
         rows = tables.as_text(*build_flight_table(plan), display.width, _SPARE)
     else:
@@ -239,7 +239,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Return how many windows can be used now, which of them only with care, and which planned ones not at all."""
+    """Describe how many windows can be used now, which of them only with care, and which planned windows not at all."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
@@ -267,7 +267,7 @@ def _name_flights(numbers: Sequence[int]) -> str:
 
 
 def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the next commands for the windows that can be used now, as pairs of a name and a command."""
+    """Return the next commands for the windows that can be used now, as (name, command) pairs."""
     if not plan.windows:
         return []
     waiting = any(row.status == "re-plan" for row in plan.flights)
@@ -310,7 +310,7 @@ def as_markdown(plan: RunPlan, _: DisplayOptions) -> str:
 
 
 def list_reasons(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return why windows are not supported, as pairs of a flight and a sentence."""
+    """Return why windows are not supported, as (flight, sentence) pairs."""
     return [(f"flight {row.number}", row.reason) for row in plan.flights if row.reason]
 
 
@@ -322,15 +322,15 @@ def as_csv(plan: RunPlan, _: DisplayOptions) -> str:
 def as_value(plan: RunPlan, display: DisplayOptions) -> str:
     """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
-    These are the windows that are done, and the supported new ones or, if asked for, all new ones.  Nothing is returned
-    if there is no new window.
+    These are the windows that are done and the supported new windows or, on request, all new windows.  Nothing is
+    returned if there is no new window.
     """
     new = plan.all_windows if display.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the rigid time given up for quality, and the position errors, as pairs of a name and a sentence."""
+    """Return the rigid time given up for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
     pairs = [(row.number, row.answer) for row in supported if row.answer]
@@ -359,7 +359,7 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
 
 
 def _list_position_errors(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the position errors that the remarks do not name, for a table without a column for them."""
+    """Return the position errors that the remarks do not mention, if the table has no column for them."""
     return [
         (f"flight {row.number}", f"out of place at td by {_format_place_error(row)}")
         for row in plan.flights

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import PairSuggestion
     from d2rpick.report.formats import DisplayOptions
 
-# fields of a run in JSON, and columns of the table
+# Fields of a run in the JSON output, which are also the columns of the table.
 RUN: Final = row(
     *(
         Field(key, "number")
@@ -80,7 +80,7 @@ class Scan(NamedTuple):
 
 
 def as_table(scan: Scan, display: DisplayOptions) -> str:
-    """Return the events of the reference run, a row for each tr, and the error of the recommended tr."""
+    """Return as text the events of the reference run, a row for each tr, and the error of the recommended tr."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
     recommended = _get_recommended_tr(answer)
@@ -136,7 +136,7 @@ def _get_recommended_tr(answer: PairSuggestion) -> float | None:
 
 
 def _list_short_values(outcome: Outcome) -> list[tables.Cell]:
-    """Return a run's table cells with four digits: runs already differ in the second digit."""
+    """Return a run's table cells with four digits, which suffice because runs differ in the second digit."""
     return [float(f"{value:.4g}") for value in RUN.plain(outcome).values()]
 
 

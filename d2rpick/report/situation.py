@@ -1,4 +1,4 @@
-"""Describe the common parts of suggest and verify: history, flight, oscillator and health of the run."""
+"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-# Largest number of parts that a line names; the JSON document contains all.
+# Largest number of parts that a line names. The JSON output contains all parts.
 _NAMED = 5
 
 
@@ -31,7 +31,7 @@ def describe_input(history: History) -> str:
 
 
 def name_energy(history: History) -> str:
-    """Return the name of the energy; with many parts only the first ones are named."""
+    """Return the name of the energy; if it belongs to many parts, only the first of them are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
     if len(parts) <= _NAMED:
         return history.channel
@@ -66,7 +66,7 @@ def label_deformation(unit: str) -> str:
 def list_situation_heading(
     situation: Situation, *, verbose: bool = False
 ) -> list[tuple[str, str]]:
-    """Return history and basis of the choice, as pairs of a name and a text; ``verbose`` adds reasons."""
+    """Return the history and the basis of the choice, as (name, text) pairs; ``verbose`` adds reasons."""
     flight = situation.flight
     share = situation.kinetic_share
     why = situation.vibration.reasons if verbose else None
@@ -100,7 +100,7 @@ def list_situation_heading(
 
 
 def name_evidence(source: str | None) -> str:
-    """Return the name of the source of a flight for people."""
+    """Return the displayed name of the source of a flight."""
     return "energy alone, not certain" if source == "energy" else str(source)
 
 
@@ -141,7 +141,7 @@ def _explain_level_alone(situation: Situation) -> str:
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
-    """Return the column names of a table of health; the first gives the time up to which it was judged."""
+    """Return the column names of the health table. The first contains the time up to which the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -151,7 +151,7 @@ def list_health_columns(health: Health) -> tuple[str, ...]:
 
 
 class Measure(NamedTuple):
-    """A health measure for people: ``value`` and ``good`` are None if the files lack it."""
+    """A displayed health measure; ``value`` and ``good`` are None if the files lack the energies for it."""
 
     what: str
     value: str | None
@@ -160,7 +160,7 @@ class Measure(NamedTuple):
 
 
 def list_health_measures(health: Health) -> list[Measure]:
-    """Return all health measures of a run, those of its rigid window last."""
+    """Return all health measures of a run; the measures of its rigid window are last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)

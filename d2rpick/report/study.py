@@ -36,7 +36,7 @@ STATUS: Final = one_of(
     "ok", "none", "unreadable", "out-of-range", "failed", "internal-error"
 )
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
-# Fields of a run whose status is ok; they are None otherwise.
+# Fields of a run that are None unless its status is "ok".
 _JUDGED: Final[dict[str, Any]] = {
     "description": "One run; null where nothing can be said.",
     "if": {"properties": {"status": {"const": "ok"}}},
@@ -109,7 +109,7 @@ _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
-# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and the line after them.
+# Newline-delimited JSON has a line for each run, which `d2rpick.api.studies` writes, and a last line.
 _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
@@ -122,7 +122,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Columns that are left out, in this order, if a terminal is too narrow.
+# Columns that are omitted, in this order, if a terminal is too narrow.
 _SPARE: Final = ("E(td)", "+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -134,7 +134,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return the common results of the runs, and one line per run with its shortened name."""
+    """Return as text the common results of the runs, and one line per run with its shortened name."""
     head, rows = tables.select_known_columns(*build_run_table(answer))
     rows = [
         [name, *row[1:]]
@@ -165,7 +165,7 @@ def as_csv(answer: StudyOfRuns, _: DisplayOptions) -> str:
 
 
 def as_ndjson(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return the lines of the runs that are not written yet, and the common results of the runs."""
+    """Return the lines of the runs that have not been written yet, and the line with the common results."""
     return "\n".join([*display.lines, LAST.as_json(answer, display.command, None)])
 
 
@@ -212,7 +212,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return the common results of the runs, as pairs of a name and a text."""
+    """Return the results common to all runs, as (name, text) pairs."""
     spread = answer.spread
     common = answer.common
     own_tr = "none"
@@ -240,14 +240,14 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest error, or one number if they are displayed the same."""
+    """Return the smallest and largest error as text; one number if both are displayed alike."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
 
 
 def _count_verdicts(answer: StudyOfRuns) -> str:
-    """Return how many runs have each verdict on their own pair."""
+    """Count for each verdict the runs whose own pair has it."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {format_number_of_runs(counts[word])}"
@@ -265,7 +265,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return, without duplicates, why the runs' pairs are not better, and how to improve them."""
+    """Return why the runs' pairs are not better, and how to improve them, without duplicates."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs

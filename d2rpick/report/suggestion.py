@@ -47,7 +47,7 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# Columns that are left out first if a table would be too wide, and those shown only with ``verbose``.
+# First: columns that are omitted first if a table would be too wide. Second: columns shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 
@@ -192,7 +192,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return the next command for a pair that can be used."""
+    """Return the next command if the pair can be used."""
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
         return []
@@ -205,7 +205,7 @@ def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
-    """Return the respects in which the better pair is better."""
+    """Describe in which respects the better pair is better."""
     recommended = answer.recommended
     if recommended is None:
         return "it has an admissible tr"
@@ -220,7 +220,7 @@ def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
 
 
 def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return the alternatives to the recommended pair, as pairs of a name and a sentence."""
+    """Return the alternatives to the recommended pair, as (name, sentence) pairs."""
     chosen = answer.recommended.tr if answer.recommended else None
     if answer.windows:
         lines = [("admissible", describe_acceptable_windows(answer.windows, chosen))]
@@ -276,7 +276,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Return the windows of acceptable tr: that of the recommended tr, the longest others, and their total share."""
+    """Describe the windows of acceptable tr: the recommended tr's window, the longest others, and the total share."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
@@ -304,9 +304,9 @@ def has_recommended_tr(window: AcceptableWindow, tr: float | None) -> bool:
 
 
 def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return the recommended tr, and td if it was chosen too, with the fewest digits that give the same number.
+    """Return the recommended tr, and td if it was chosen too, with just enough digits to give the same number.
 
-    Without a recommendation the text is empty.
+    The text is empty if there is no recommendation.
     """
     pair = answer.recommended
     if pair is None:
@@ -338,7 +338,7 @@ def build_candidate_table(
 
 
 def _shorten_verdict(answer: PairSuggestion, candidate: Candidate) -> str:
-    """Return the verdict on a candidate with its reason, unless the lines above the table give the same reason."""
+    """Return the verdict on a candidate, with its reason unless the lines above the table already give it."""
     decision = answer.decision_on(candidate)
     answered = answer.decision
     if answered is not None and decision.reason == answered.reason:

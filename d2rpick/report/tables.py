@@ -15,21 +15,21 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# Width of a column above which long words, such as paths or lists of parts, are split in a table that is too wide.
-# If that is not enough, words longer than the least width are split too; no number is as long.
+# If a table is too wide, long words (paths, lists of parts) are split in columns wider than the first width.
+# If that is not enough, words longer than the least width are split too. No number is that long.
 _WORD: Final = 32
 _LEAST: Final = 12
-# A formula begins with one of these signs, which spreadsheets of some languages also accept in full width.
+# A formula begins with one of these signs; spreadsheets in some languages also accept their full-width forms.
 # It begins at the start of a cell, or after a semicolon, the cell separator in languages with a decimal comma.
 # A number is not a formula.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# A longer cell is text, which is wrapped before a column is left out [letters].
+# A cell with more letters than this is treated as text, which is wrapped before a column is omitted.
 _TEXT: Final = 20
 
 
 def format_short(value: Cell) -> str:
-    """Write a cell for people: six significant digits, a dash if the value is unknown.
+    """Format a cell for display: six significant digits, or a dash if the value is unknown.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def format_short(value: Cell) -> str:
 
 
 def format_measure(value: float | None) -> str:
-    """Write a share or an error with three decimals, such as 0.957, or a dash if it is unknown.
+    """Format a share or an error with three decimals, such as 0.957; a dash if it is unknown.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def format_measure(value: float | None) -> str:
 
 
 def format_if_known(value: float | None, form: str) -> str | None:
-    """Format a number by a Python format such as ``.0%``; return None if it is unknown."""
+    """Format a number with a Python format such as ``.0%``; return None if the number is unknown."""
     return None if value is None else format(value, form)
 
 
@@ -102,7 +102,7 @@ def fill_table(
 def remove_star_column(
     head: Sequence[str], rows: Iterable[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Leave out the first column, which has a star for what is recommended, and write +- as ``±`` for a page."""
+    """Remove the first column, in which a star marks the recommendation, and write +- as ``±`` for a page."""
     return [name.replace("+-", "±") for name in head[1:]], [
         list(row[1:]) for row in rows
     ]
@@ -111,14 +111,14 @@ def remove_star_column(
 def format_in_line(
     named_texts: Iterable[tuple[str, Cell]], width: int = 0
 ) -> list[str]:
-    """Return aligned lines of a name and its text; names have ``width`` letters, by default those of the longest."""
+    """Return lines of a name and a text, aligned at ``width`` letters, by default the length of the longest name."""
     lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
 
 
 def format_as_list(named_texts: Iterable[tuple[str, str]]) -> list[str]:
-    """Return pairs of a name and a text as paragraphs of Markdown."""
+    """Return (name, text) pairs as Markdown paragraphs."""
     return [f"{name}: {escape_markdown(text)}" for name, text in named_texts]
 
 
@@ -128,7 +128,7 @@ def as_text(
     width: int = WIDEST,
     spare: Iterable[str] = (),
 ) -> str:
-    """Return a table as text: numbers aligned right, columns separated by two blanks.
+    """Return a table as text, with right-aligned numbers and two blanks between columns.
 
     A table wider than ``width`` first loses the columns in ``spare``, in their order; then the widest columns wrap
     their text.
@@ -177,7 +177,7 @@ def as_text(
 
 
 def wrap_lines(text: str, width: int) -> str:
-    r"""Wrap the lines of a text that are longer than ``width``; further lines are indented to the text after the name.
+    r"""Wrap the lines of a text that are longer than ``width``; continuations are indented to the text after the name.
 
     Examples
     --------
@@ -193,7 +193,7 @@ def wrap_lines(text: str, width: int) -> str:
 
 
 def wrap_command(line: str, width: int) -> str:
-    r"""Wrap a command line that is longer than ``width`` before options, so that a shell reads it as one line.
+    r"""Wrap a command line longer than ``width`` before its options, so that a shell still reads it as one line.
 
     Examples
     --------
@@ -217,7 +217,7 @@ def wrap_command(line: str, width: int) -> str:
 
 
 def _wrap_below_name(line: str, width: int) -> str:
-    """Wrap a line, and indent its further lines to the text after the name, or like the line itself."""
+    """Wrap a line, and indent its continuation lines to the text after the name, or else like the line itself."""
     from textwrap import fill
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
@@ -234,7 +234,7 @@ def _wrap_below_name(line: str, width: int) -> str:
 def _reduce_widths(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
-    """Reduce the widest columns until a table fits: first wrap names, then cells, and split words last."""
+    """Reduce the widest columns until a table fits: wrap column names first, then cells, and at last split words."""
     narrowed = list(widths)
     names, *cells = (
         [min(_WORD, max(map(len, text.split()), default=1)) for text in row]
@@ -268,7 +268,7 @@ def _wrap_cells(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]
 
 
 def _wrap_words(text: str, width: int) -> list[str]:
-    """Wrap a text between words; too long words break after the signs that join names, folders and part ids."""
+    """Wrap a text between words. Words that are too long break after the signs that join names, paths and part ids."""
     from textwrap import TextWrapper
 
     wrapper = TextWrapper(width, break_on_hyphens=False)
@@ -311,9 +311,9 @@ def escape_markdown(text: str) -> str:
 
 
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    r"""Return CSV at full precision: comma-separated, empty cells for unknown values, lines ending in a line feed.
+    r"""Return CSV at full precision, with commas, line feeds at line ends, and empty cells for unknown values.
 
-    A text that a spreadsheet would compute as a formula gets an apostrophe before it: names and titles come from files.
+    A text that a spreadsheet would treat as a formula gets a leading apostrophe: names and titles come from files.
 
     Examples
     --------
@@ -341,7 +341,7 @@ def _make_exact_cell(value: Cell) -> Cell:
 
 
 def as_json(result: Any, indent: int | None = 2) -> str:
-    r"""Write a result as JSON at full precision, null for unknown values; a NaN is a bug and raises ValueError.
+    r"""Write a result as JSON at full precision, with null for unknown values. A NaN is a bug and raises ValueError.
 
     Without ``indent`` it is one line.  Characters that control a terminal or change the text direction become
     ``\u....``.
@@ -362,14 +362,14 @@ def as_json(result: Any, indent: int | None = 2) -> str:
 
 
 def quote_shell_line(words: Iterable[str]) -> str:
-    r"""Quote words so that bash, zsh and POSIX shells of 2024 restore them, with printable characters only.
+    r"""Quote words with printable characters only, so that bash, zsh and POSIX.1-2024 shells read them back unchanged.
 
     Examples
     --------
     >>> print(quote_shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
-    import shlex  # imported here to start faster
+    import shlex  # Imported here to keep start-up fast.
 
     return " ".join(
         shlex.quote(word)
@@ -380,7 +380,7 @@ def quote_shell_line(words: Iterable[str]) -> str:
 
 
 def make_positional(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names as they are typed after the options: after ``--`` if one could be mistaken for an option.
+    """Return names as typed after the options of a command, with ``--`` before them if a name looks like an option.
 
     Examples
     --------
@@ -400,7 +400,7 @@ def make_positional(names: Sequence[str]) -> tuple[str, ...]:
 def _escape_letter(letter: str) -> str:
     if letter.isprintable():
         return f"\\{letter}" if letter in "\\'" else letter
-    # Bytes of a file name that are not valid text are lone surrogates.
+    # Bytes of a file name that are not valid text appear as lone surrogates.
     errors = "surrogateescape" if "\udc80" <= letter <= "\udcff" else "surrogatepass"
-    # Three octal digits end by themselves; some shells read more than two hexadecimal digits.
+    # Octal, because three octal digits are always complete; some shells read more than two hexadecimal digits.
     return "".join(f"\\{byte:03o}" for byte in letter.encode(errors=errors))

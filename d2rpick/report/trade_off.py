@@ -39,19 +39,20 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# columns of the CSV and of a frame
+# columns of the CSV output and of a data frame
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
 
 
-# smallest change of the rigid time, as a share of it, that is mentioned
+# A smaller relative change of the rigid time is not mentioned.
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share within these limits is halved; if it falls further, its new value is given.
+# An error that falls to a share within these limits is described as halved.
+# If it falls further, its new value is given.
 _HALF: Final = (0.45, 0.5)
 
 
-# Columns that are left out first if the table would be too wide.
+# Columns that are omitted first if the table would be too wide.
 _SPARE: Final = (
     "timing tolerance",
     "level error",
@@ -65,7 +66,7 @@ _NOT_HALVED: Final = "No other td in the range halves this error without giving 
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the answer in a sentence, the verdict on the best pair, Pareto-optimal offers, and the input."""
+    """Return the answer in one sentence, the verdict on the best pair, the Pareto-optimal offers, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -94,7 +95,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and how to improve it, as pairs of a name and a text."""
+    """Return what to do with the recommended pair, why, and how to improve it, as (name, text) pairs."""
     best = trade_off.recommended
     decision = trade_off.decide_on(best) if best else None
     if best is None or best.best is None or decision is None:
@@ -104,7 +105,7 @@ def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the same offers as a Markdown table, with the answer below it."""
+    """Return the offers of the text table as a Markdown table, with the answer below it."""
     offer_table = tables.select_known_columns(
         *build_offer_table(select_offers(trade_off, display.limit))
     )
@@ -123,7 +124,7 @@ def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
 def give_answer(trade_off: TradeOff) -> str:
     """Return in one sentence how good the requested td is, and the gain or cost of another td.
 
-    Without a requested td, the comparison starts from the td that saves most.
+    Without a requested td, other td are compared with the td that saves most.
     """
     start = trade_off.start
     step = trade_off.step
@@ -174,7 +175,7 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 
 
 def _explain_why_no_pair(trade_off: TradeOff) -> str:
-    """Explain why no td has a pair by the td of the highest energy, of which most could be kept."""
+    """Explain why no td has a pair, by the example of the td with the highest energy, which could keep most."""
     if not trade_off.offers:
         return "no td in the range has an admissible tr"
     highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
@@ -182,19 +183,19 @@ def _explain_why_no_pair(trade_off: TradeOff) -> str:
 
 
 def _describe_longest(start: Offer) -> str:
-    """Return in which respect the td from which the comparison starts exceeds the others."""
+    """Describe in which respect the td with which others are compared exceeds them."""
     return "is rigid for longest" if start.saving is None else "saves the most CPU time"
 
 
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
-    """Return the distance of the other td, and its value."""
+    """Describe how far away the other td is, with its value."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
 
 
 def _describe_error_change(start: Offer, step: Offer) -> str:
-    """Return how the error changes at the other td."""
+    """Describe how the error changes at the other td."""
     assert start.error is not None or step.error is not None
     if start.error is None:
         return "brings the energy at td below twice its mean"
@@ -204,7 +205,7 @@ def _describe_error_change(start: Offer, step: Offer) -> str:
 
 
 def _describe_cost_change(start: Offer, step: Offer) -> str:
-    """Return how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
+    """Describe how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
@@ -232,7 +233,7 @@ def _format_offer_error(offer: Offer) -> str:
 
 
 def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
-    """Return the offers named by the answer, and evenly spaced Pareto-optimal ones, up to ``limit`` in all."""
+    """Return up to ``limit`` offers: those that the answer names, and evenly spaced Pareto-optimal ones."""
     named_td = {
         offer.td
         for offer in (
@@ -263,7 +264,7 @@ def build_offer_table(
 
 
 def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
-    """Return a function that formats a measure of the best pair of an offer."""
+    """Return a function that formats a measure of an offer's best pair."""
     return lambda offer: (
         tables.format_if_known(getattr(offer.best, key), form) if offer.best else None
     )

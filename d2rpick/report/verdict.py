@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions
 
-# the judged pair, its measures and the verdict
+# fields of the judged pair, its measures and the verdict
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -69,7 +69,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return the verdict, the reasons and improvements, its evidence, and the measures of the pair."""
+    """Return as text the verdict with reasons and improvements, its evidence, and the measures of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
@@ -93,7 +93,7 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
-    """Return what to do with the pair, why, and how to improve it, as pairs of a name and a sentence."""
+    """Return what to do with the pair, why, and how to improve it, as (name, sentence) pairs."""
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
 
 
@@ -127,7 +127,7 @@ def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
 
 
 def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
-    """Return the known measures of the pair with their names for people."""
+    """Return the known measures of the pair with their displayed names."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
     rows: list[tuple[str, tables.Cell]] = [
@@ -168,7 +168,7 @@ def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return each measure by its key, those of a switched run with the prefix ``switched_``; reasons are one text."""
+    """Return each measure by its key, with the prefix ``switched_`` for a switched run. Reasons are one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -192,7 +192,7 @@ def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
 
 
 def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Return the numbers that both runs have as rows of name, reference and switched run, below `COMPARED`."""
+    """Return the numbers known for both runs as rows of name, reference run and switched run (header: `COMPARED`)."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
@@ -205,7 +205,7 @@ def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
 
 
 def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """Return how far the switched run deviates from the reference after td, as pairs of a name and a text."""
+    """Return how far the switched run deviates from the reference after td, as (name, text) pairs."""
     error = switched.momentum_error
     displacement = switched.displacement
     if error is None:
@@ -230,7 +230,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures of the switched run under their own names, empty without a switched run."""
+    """Return the measures of the switched run by name; empty without a switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

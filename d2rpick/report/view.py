@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown beyond each end of the flight, as a share of it: the load and the start of the landing are visible.
+# Time shown beyond each end of the flight, as a share of its length, so that load and landing are visible.
 _BEYOND = 0.06
-# Ratio of the highest energy to the level above which the axis is logarithmic, since the level would vanish.
-# A logarithmic axis ends at the level divided by this ratio.
+# The axis is logarithmic if the highest energy exceeds the level by more than this factor,
+# since the level would not be visible otherwise. A logarithmic axis begins at the level divided by this factor.
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# space above and below the curve, as a share of its height
+# space above and below the curve, as a share of the curve's height
 _ROOM = 0.08
-# Possible error of the ends of a flight, as a share of it: the load or the landing may act there.
+# Share of a flight at each of its ends that is ignored, because the load or the landing may still act there.
 _UNSURE = 0.01
-# points of a curve: some dozens per oscillation cycle
+# number of points of a curve: a few dozen per oscillation cycle
 _POINTS = 2000
 
 
 class View(NamedTuple):
     """The visible range from ``start`` to ``end`` [time], in which the flight has energies from ``low`` to ``high``.
 
-    ``above`` holds name ("load", "landing") and height [energy] of what is higher than the flight in this range.
+    ``above`` lists the name ("load", "landing") and height [energy] of each peak in this range above the flight.
     """
 
     start: float
@@ -46,7 +46,7 @@ class View(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Lowest and highest visible value, with some room [energy]; ``logarithmic`` is True for a logarithmic axis."""
+    """Lowest and highest visible value of an axis, with some room [energy]; ``logarithmic`` gives its kind."""
 
     low: float
     high: float
@@ -56,7 +56,7 @@ class Scale(NamedTuple):
 def merge_windows(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
-    """Join windows in ascending order that are less than ``gap`` apart [time]: noise makes hundreds of short ones.
+    """Merge windows, in ascending order, that are less than ``gap`` apart [time], since noise makes hundreds of them.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def make_view(
     times: list[float],
     last_known: float | None = None,
 ) -> View:
-    """Return the view of a flight and ``times`` [time]; a flight of unknown end lasts to ``known`` or the last time.
+    """Return the view of a flight and ``times`` [time]. A flight of unknown end lasts until ``known`` or the last time.
 
     If no flight is known, the view is the whole record.
     """
@@ -164,7 +164,7 @@ def _read_flight_energies(
 
 
 class ReplayedMotion(NamedTuple):
-    """Deformations over ``time`` [time] of one shape, without switching and ``switched`` [square root of energy]."""
+    """Deformation in one shape over ``time`` [time], without switching and ``switched`` [square root of energy]."""
 
     time: Samples
     reference: Samples
@@ -174,7 +174,7 @@ class ReplayedMotion(NamedTuple):
 def replay_motion(
     situation: Situation, tr: float, time: Samples | None = None
 ) -> ReplayedMotion | None:
-    """Replay a pair of switch times with the one oscillator that describes the record.
+    """Compute the motion for a pair of switch times with the single oscillator that describes the record.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def replay_motion(
 
 
 class Response(NamedTuple):
-    """The motion of the one oscillator that describes a record, from which the motion for any switch times follows.
+    """Motion of the single oscillator that describes a record; it determines the motion for any switch times.
 
     On an even grid of ``time`` (n,) [time], ``reference`` is the deformation without switching; ``release`` is the
     share of a released deformation that remains after the time since the first grid point.  Deformations vibrate about
@@ -226,7 +226,7 @@ class Response(NamedTuple):
 
 
 def compute_response(situation: Situation) -> Response | None:
-    """Return the response of the one oscillator that describes the record, None if no oscillator does."""
+    """Return the response of the single oscillator that describes the record; None without such an oscillator."""
     mode = situation.vibration.whole.mode
     span = situation.evidence.span
     td = situation.td
@@ -246,7 +246,7 @@ def compute_response(situation: Situation) -> Response | None:
 def compute_locked_in_deformation(
     situation: Situation, tr: float | None
 ) -> float | None:
-    """Return the deformation locked in at tr [square root of energy], None if no single oscillator describes it."""
+    """Return the deformation locked in at tr [square root of energy]; None if no oscillator describes the record."""
     if tr is None or not situation.vibration.whole.described(tr):
         mode = None
     else:

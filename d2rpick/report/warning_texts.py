@@ -1,4 +1,4 @@
-"""Explain each warning: its meaning for the result, and the cure; ``d2rpick rule CODE`` prints the text.
+"""Explain what each warning means for the result, and its cure; ``d2rpick rule CODE`` prints the text.
 
 The topics are the headings of docs/reference/warnings.md, which ``python -m tests.reference`` writes from these texts.
 """

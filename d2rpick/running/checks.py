@@ -1,4 +1,4 @@
-"""Check, before anything is computed, that a first run can switch itself."""
+"""Check, before a first run is computed, that it can switch its parts by itself."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NO_CONTACT: Final = (
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError if a support holds one of the parts, since its force is not a contact force."""
+    """Raise DeckError if a support holds one of the parts, since a support force is not a contact force."""
     if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"
@@ -42,7 +42,7 @@ def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
     """Yield sensor kind and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            # keywords are /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
+            # The keyword is /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id.
             yield "INTER", get_number(card, 2) or get_number(card, 3)
     for card in starter.named("RWALL"):
         yield "RWALL", get_number(card, -1)

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches itself: compute a leg, read its history, choose the next leg."""
+"""Drive a Radioss run that switches its parts by itself: compute a leg, read its history, choose the next leg."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest step of a rigid leg relative to the mean step of the deformable legs.
-# A rigid leg then costs a few percent of a deformable one, and its history has enough states to show a contact.
+# Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
+# With it a rigid leg costs a few percent of a deformable one, and its history has enough states to show a contact.
 _STEP_RATIO: Final = 5.0
-# A flight shorter than the wait is reported if it lasted for this share of the wait.
+# A flight shorter than the wait is reported if it lasted for at least this share of the wait.
 _REPORTED: Final = 0.5
-# Pause between two checks of the solver, and its longest silence before a report [s].
+# First: pause between two checks of the solver [s]. Second: time without output after which it is reported [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
@@ -62,9 +62,9 @@ class Driven:
     legs : tuple of Leg
         All computed legs.
     why : str
-        Reason of the wait.
+        Why the wait has this length.
     saved : (float or None, float or None)
-        Share of a deformable run that is saved, by the cost model and by CPU time; None if unknown.
+        Saved share of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
     """
 
     run: OpenedRun
@@ -78,7 +78,7 @@ class Driven:
 
 @dataclass
 class Driver:
-    """Computes one run in its folder, from the end of its journal on.
+    """Computes one run in its folder, and continues after the last record of its journal.
 
     ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
@@ -95,7 +95,7 @@ class Driver:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, including discarded ones, except those before whose start the run went back."""
+        """Computed legs, including discarded ones, without the legs that a restart from an earlier time has undone."""
         legs: list[Leg] = []
         for record in self.journal.records:
             if record["event"] == "ended":
@@ -106,14 +106,14 @@ class Driver:
 
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
-        """Warnings for all windows in which parts still oscillated at tr."""
+        """The warnings for all windows at whose tr parts still oscillated."""
         messages = dict.fromkeys(
             record["place"] for record in self.journal.all("ended")
         )
         return tuple(Caution("out-of-place", text) for text in messages if text)
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless this was done.
+        """Copy the deck into the folder and run the starter, unless this has already been done.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Driver:
         for name, content in self.deck.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(folder / name, content)
-        # The starter reads /RBODY/OFF from the first engine file.
+        # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
         first_engine_file = self.solver.file(1, ".rad")
         write_as_a_whole(first_engine_file, self.deck.leg(1, self.deck.end, None))
         self._start_solver("starter", 0)
@@ -139,7 +139,7 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed; before the first one, how many ``seconds`` the starter runs."""
+        """Describe the leg that is being computed; before the first leg, how many ``seconds`` the starter has run."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
@@ -151,7 +151,7 @@ class Driver:
         Raises
         ------
         D2RPickError
-            If the solver fails or the disk is full.  The run goes on from there when it is driven again.
+            If the solver fails or the disk is full.  The run continues from there when it is driven again.
         """
         if legs := self.legs:
             self.told(
@@ -166,7 +166,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg; go back leg by leg until its initial restart is complete."""
+        """Choose the next leg. If the restart from which it begins is damaged, go back leg by leg to a complete one."""
         legs = self.legs
         leg_count = len(legs)
         order = choose_next_leg(legs, self.limits)
@@ -207,12 +207,12 @@ class Driver:
         )
 
     def _start_solver(self, program: str, number: int) -> None:
-        """Start the starter or the engine on the deck of a leg, 0 for the starter."""
+        """Start the solver on the deck of a leg: the starter if ``leg`` is 0, else the engine."""
         deck = self.solver.file(number, ".rad").name
         self.solver.start(self.commands.words(program, deck), number)
 
     def _limit_rigid_step(self) -> float:
-        """Return the largest step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+        """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
         steps = [
             leg.length / leg.cycles
             for leg in self.legs
@@ -242,12 +242,12 @@ class Driver:
     def _end(self, order: Order) -> None:
         """Write the findings of a leg to the journal.
 
-        A leg that left no whole restart or history is computed again, once.
+        A leg that left no complete restart or history is computed again, once.
 
         Raises
         ------
         D2RPickError
-            If the solver failed, or the leg left no whole restart for the second time.
+            If the solver failed, or the leg left no complete restart for the second time.
         """
         number = order.number
         if not self.solver.ended_well(number):
@@ -274,18 +274,19 @@ class Driver:
         )
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
-            kept_restarts.add(first.number - 1)  # for a window that is left out
+            # The restart before the window is needed if the window is dropped.
+            kept_restarts.add(first.number - 1)
         self.solver.keep(kept_restarts)
 
     def _is_whole(self, order: Order, cycles: int | None) -> bool:
-        """Return True if a leg left whole restarts, and a history that ends with it."""
+        """Return True if a leg left complete restarts, and a history that extends to the end of the leg."""
         step = (order.until - order.start) / (cycles or 1)
         last_state = order.until - max(3 * self.limits.interval, 2 * step)
         number = order.number
         return self.solver.whole(number) and self.solver.came_to(number, last_state)
 
     def _repeat(self, order: Order) -> None:
-        """Note that a leg is to be computed again; D2RPickError if it was before."""
+        """Note that a leg is to be computed again; raise D2RPickError if it has been repeated before."""
         if order in self._repeated:
             listing = self.solver.file(order.number, ".out")
             raise D2RPickError(
@@ -325,7 +326,7 @@ class Driver:
 
 
 def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
-    """Return a warning if parts swing too much in the window that the last leg ends; "" if not."""
+    """Return a warning if parts oscillate too much in the window that ends with the last leg; otherwise ""."""
     if legs[-1].findings.contact is None:
         return ""
     window = find_next_window(legs, limits)
@@ -336,7 +337,7 @@ def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
 
 
 def _read_leg(record: dict[str, Any]) -> Leg:
-    """Make a leg of a record of the journal."""
+    """Make a leg from a record of the journal."""
     findings = LegFindings(*record["seen"])
     short = tuple((start, end) for start, end in findings.short)
     return Leg(
@@ -348,7 +349,7 @@ def _read_leg(record: dict[str, Any]) -> Leg:
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
-    """Return the longest wait of the legs that ended by a time and in which something vibrated [time]."""
+    """Return the longest wait among the legs that ended before a time and in which something vibrated [time]."""
     waits = [
         leg.findings.wait or 0.0
         for leg in legs
@@ -360,7 +361,7 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
 class Observer:
     """Reads the histories of legs for some ``parts`` of a deck.
 
-    ``wait`` is the one the user gave, ``of_deck`` the one that follows from the deck.
+    ``wait`` is the wait that the user gave, ``of_deck`` the wait that follows from the deck.
     """
 
     def __init__(
@@ -433,7 +434,7 @@ class Observer:
     def _find_short_flights(
         self, order: Order, wait: float | None
     ) -> tuple[tuple[float, float], ...]:
-        """Return start and end of each flight in a leg that lasted for less than the wait, but not for much less."""
+        """Return the start and end of each flight in a leg that was a little shorter than the wait."""
         if not wait:
             return ()
         return tuple(
@@ -443,7 +444,7 @@ class Observer:
         )
 
     def _get_needed_wait(self, start: float, now: float) -> float | None:
-        """Return the wait after ``start`` [time]: the user's, but the record's if nothing vibrates; None if unknown."""
+        """Return the wait after ``start`` [time]: the user's, or the record's if nothing vibrates; None if unknown."""
         shown_wait = self._motion.wait(start, now)
         at_rest = shown_wait is not None and shown_wait.source == "at-rest"
         if self._given is not None and not at_rest:
@@ -452,7 +453,7 @@ class Observer:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose tr at that end of a leg with the higher internal energy, of those in flight [time]."""
+    """Choose as tr the start or the end of a leg, whichever has the higher internal energy and is in flight [time]."""
     start = max(order.start, float(history.time[0]))
     falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
     starts_in_flight = order.start >= max(free, order.switch_after)
@@ -474,7 +475,7 @@ class Journal:
         self._line_end = b"\n" if content and not content.endswith(b"\n") else b""
 
     def add(self, event: str, **values: Any) -> dict[str, Any]:
-        """Append a record; D2RPickError if the disk has no room for it."""
+        """Append a record; raise D2RPickError if the disk is full."""
         record = {"event": event, **values}
         line = add_checksum(json.dumps(record, allow_nan=False)).encode()
         try:

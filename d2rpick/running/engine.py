@@ -1,6 +1,6 @@
 """Start and stop the processes of a solver in the folder of a run, and read their output.
 
-Names and heads of restarts come from runs with OpenRadioss 2026-08.
+The names and first bytes of restart files were observed in runs with OpenRadioss 2026-08.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
 _CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
 _TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
-# Bytes that are read from the end of a listing.
+# Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# The listing of a starter reports errors first, and much output follows them.
-# The values are the bytes read from its end, the beginning of an error, and the number of its lines.
+# Errors in the listing of a starter are followed by much output, so more bytes are read from its end (first value).
+# Second: the text with which an error begins. Third: the number of lines of an error.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
-# A complete restart file has at least this share of the size of the one written by the starter.
+# A restart file is complete if it has at least this share of the size of the starter's restart file.
 _WHOLE: Final = 0.98
-# Time that a solver has to stop, and pause between two checks [s].
+# First: time that a solver is given to stop [s]. Second: pause between two checks [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
-    """Commands of starter and engine, None for those of the installation, and the number of threads."""
+    """The commands that start starter and engine (None: those of the installation), and the number of threads."""
 
     starter: str | None = None
     engine: str | None = None
@@ -80,7 +80,9 @@ class Commands(NamedTuple):
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
         executable, *arguments = split
-        if "/" in executable:  # the program is started in another folder
+        if (
+            "/" in executable
+        ):  # The path is made absolute because the program is started in another folder.
             executable = str(Path(executable).absolute())
         threads = str(self.threads)
         return [
@@ -92,7 +94,7 @@ class Commands(NamedTuple):
         ]
 
     def missing(self) -> str:
-        """Return the first program that cannot be started, "" if there is none; errors as `words`."""
+        """Return the first program that cannot be started, or "" if all can; errors as `words`."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -126,7 +128,7 @@ def _make_environment(threads: int) -> dict[str, str]:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Lock a folder against other drivers; D2RPickError if one is running there."""
+    """Lock a folder against other drivers; raise D2RPickError if a driver is already running there."""
     lock = _lock(folder / ".drive.lock")
     if lock is None:
         raise D2RPickError(
@@ -161,10 +163,10 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
-        self._signal = 0  # signal that ended the last process; 0 if none did
+        self._signal = 0  # signal that ended the last process, or 0
 
     def file(self, number: int, suffix: str) -> Path:
-        """Return the path of a file of a leg, 0 for the starter."""
+        """Return the path of a file of a leg; leg 0 is the starter."""
         return self.folder / f"{self.name}_{number:04d}{suffix}"
 
     def history(self, number: int) -> Path:
@@ -194,7 +196,7 @@ class Solver:
         try:
             _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:
-                # In its own session Ctrl-C does not reach it: the driver stops all processes of the solver.
+                # A new session keeps Ctrl-C from the solver, because the driver itself stops all its processes.
                 self._process = subprocess.Popen(
                     command, cwd=self.folder, env=_make_environment(self.threads), stdin=subprocess.DEVNULL, stdout=log,
                     stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
@@ -230,12 +232,13 @@ class Solver:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            with suppress(KeyboardInterrupt):  # the user may interrupt again
+            # A second interrupt by the user must not leave processes running.
+            with suppress(KeyboardInterrupt):
                 while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:
-        """Return for how long the solver has written nothing [s]."""
+        """Return the time since the solver last wrote anything [s]."""
         now = time.time()
         paths = self.folder.glob(f"{self.name}*")
         written = max(
@@ -259,8 +262,8 @@ class Solver:
     def whole(self, number: int) -> bool:
         """Return True if a leg, or the starter (0), has left complete restarts of all domains.
 
-        A restart of OpenRadioss begins with its own name.  It is as long as the one of the starter except for what has
-        changed in the contacts.  A full disk leaves shorter restarts although the listing reports a normal end.
+        An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
+        data.  A full disk leaves shorter restarts although the listing reports a normal end.
         """
         of_starter, restarts = self._list_restarts(0), self._list_restarts(number)
         sizes = {_get_domain(path): path.stat().st_size for path in of_starter}
@@ -291,7 +294,7 @@ class Solver:
         )
 
     def last_words(self, number: int) -> str:
-        """Return the errors that the solver reported, or the last lines that it printed, in one line."""
+        """Return in one line the errors that the solver reported, or else the last lines that it printed."""
         listing = _read_lines(self.file(number, ".out"), _LISTING_SIZE)
         lines: list[str] = []
         for row, line in enumerate(listing):
@@ -308,14 +311,14 @@ class Solver:
         return ended + (make_printable(" | ".join(texts)) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
-        """Remove the restarts of all legs except these and the starter."""
+        """Remove all restarts except those of these legs and of the starter."""
         for path in self.folder.glob(f"{self.name}_[0-9][0-9][0-9][0-9]_*.rst"):
             number = int(path.name[len(self.name) + 1 :][:4])
             if number and number not in numbers:
                 path.unlink(missing_ok=True)
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for a leg that begins with this share of the run remaining."""
+        """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
         sizes = [
             path.stat().st_size
             for path in self.folder.iterdir()
@@ -354,12 +357,12 @@ def _read_tail(path: Path, size: int = _TAIL_SIZE) -> bytes:
 
 
 def _read_lines(path: Path, size: int = _TAIL_SIZE) -> list[str]:
-    """Return the lines at the end of a file; none if it is missing."""
+    """Return the last lines of a file; no lines if it is missing."""
     return _read_tail(path, size).decode("latin-1").splitlines()
 
 
 def _raise_stack_limit() -> None:
-    """Give the solver as much stack as the system allows, since it keeps arrays there."""
+    """Raise the stack limit to the system's maximum, because the solver keeps large arrays on the stack."""
     import resource
 
     _, limit = resource.getrlimit(resource.RLIMIT_STACK)

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from d2rpick.running.inner_motion import InnerMotion
     from d2rpick.running.witness import Quiet
 
-    # Events of the flights that are over, by the start of each flight and the time when it was seen.
+    # Events of past flights, keyed by the start of the flight and the time at which it was seen.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
 
 
 class Event(NamedTuple):
     """An event: a stable word, its time, the state at which it was ``seen`` [time], and a sentence.
 
-    ``wait`` is how long no force had to act to count as flight [time], ``left`` what changed meanwhile, as a share of
-    the largest value, ``tr`` the advised time [time].  They are None if an event has none.
+    ``wait`` is the force-free time that shows a flight [time].  ``left`` is the change in that time, as a share of the
+    largest value.  ``tr`` is the advised time [time].  Each is None if it does not apply to the event.
     """
 
     event: str
@@ -77,7 +77,7 @@ def _is_rigid(
 def _describe_rigid_times(
     history: History, rigid_times: tuple[tuple[float, float, float], ...]
 ) -> Iterator[Event]:
-    """Yield the events of parts that become rigid and deformable, except bodies that are always rigid."""
+    """Yield the events at which parts become rigid or deformable; bodies that are always rigid have none."""
     for start, seen_at, end in rigid_times:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
             continue
@@ -111,7 +111,7 @@ def _describe_flight(
 
 
 def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
-    """Report that a flight is seen, by which evidence, and why it was not seen before."""
+    """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
     quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
@@ -144,7 +144,7 @@ def _suggest_switch(
 
 
 def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise a switch when the internal energy is high, or after one more wait when it was highest."""
+    """Advise a switch while the internal energy is high; after one more wait, advise the time of its maximum."""
     last = flight.seen + flight.wait
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):

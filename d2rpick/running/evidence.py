@@ -1,7 +1,7 @@
 """Find the flights of given parts in a growing record.
 
-Each answer depends on the states up to it, never on when somebody looked.  A growing record therefore has the flights
-of the finished one.
+Each result depends only on the states up to its time, not on when the record was read.  A growing record therefore
+has the same flights as the finished one.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.running.witness import Needed
 
-# tr is good if the internal energy is at least this share of the way from its minimum to its maximum within one wait.
-# In computed runs a tr in a trough kept half of the energy that td should have, one at a peak at least 0.9 of it.
+# tr is good if the internal energy is at least this far from its minimum within one wait, as a share of its range.
+# In computed runs a tr in a trough kept half of the energy that td should have, a tr at a peak at least 0.9 of it.
 _HIGH: Final = 0.75
 # Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
@@ -39,8 +39,8 @@ class GrowingEvidence:
     def __init__(self) -> None:
         self._record = GrowingRecord()
         self._of_parts: list[GrowingWitness] = []
-        self._of_model: list[GrowingWitness] = []  # at most one witness
-        # Witnesses of sets of parts that still continue, by the indices of their parts.
+        self._of_model: list[GrowingWitness] = []  # has at most one item
+        # The evidence that still grows for each set of parts, keyed by the indices of the parts.
         self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         # For each state, the parts that have moved so far, and whether they have the complete momentum of the model.
@@ -54,11 +54,11 @@ class GrowingEvidence:
 
     @property
     def witnesses(self) -> list[GrowingWitness]:
-        """Witnesses of parts, then that of the model if it has a momentum or contact energy."""
+        """Evidence of each set of parts, and at last of the model if it has a momentum or contact energy."""
         return [*self._of_parts, *self._of_model]
 
     def take(self, states: History) -> None:
-        """Append states, which have the quantities of the states so far."""
+        """Append states, which must have the same quantities as the states so far."""
         self._record.add(states)
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)
@@ -75,9 +75,10 @@ class GrowingEvidence:
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
     ) -> None:
-        """Append momenta of parts to the witnesses of all sets of parts that may fly together.
+        """Append part momenta to the evidence of all sets of parts that may fly together.
 
-        A witness ends at a state at which the parts lack momentum of the model, as when a rigid body has taken it.
+        The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
+        when a rigid body has absorbed some parts.
         """
         assert momenta.parts is not None
         are_complete = is_complete(momenta, of_model, self._largest_momentum)
@@ -105,7 +106,7 @@ class GrowingEvidence:
             self._going_on.clear()
 
     def _begin(self, members: tuple[int, ...], momenta: Momenta, origin: int) -> None:
-        """Add the witness of a set of parts that begins at a state."""
+        """Begin to collect evidence for a set of parts at a state."""
         assert momenta.parts is not None
         parts = tuple(momenta.parts[number] for number in members)
         witness = GrowingWitness(members, parts, origin)
@@ -123,7 +124,7 @@ class GrowingEvidence:
         return self._moved.rows[-len(moved) :]
 
     def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
-        """Split the last ``count`` states where another part begins to move, or momentum begins to be missing.
+        """Split the last ``count`` states wherever a part begins to move or momentum begins to be missing.
 
         Gives for each piece its states, the numbers of the parts that move, and whether the momenta are complete.
         """
@@ -137,7 +138,7 @@ class GrowingEvidence:
             yield slice(begin, end), moving, are_complete
 
     def _add_model(self, momenta: Momenta | None, balance: Balance | None) -> None:
-        """Append momentum and contact energy of the whole model to its witness, if one of them is written."""
+        """Append the momentum and contact energy of the whole model to its evidence, if one of them is written."""
         members: tuple[int, ...] = ()
         momentum: Samples | None = None
         if momenta is not None:
@@ -157,7 +158,7 @@ class GrowingEvidence:
         )
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
-        """Return all flights that lasted for their wait, ascending; ``needed`` returns the wait at a state.
+        """Return all flights that lasted for their wait, in ascending order; ``needed`` returns the wait at a state.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
@@ -179,7 +180,7 @@ class GrowingEvidence:
     def _find_gravity(
         self, witness: GrowingWitness, first: int, last: int
     ) -> float | None:
-        """Return the gravity between two states of a witness, as `Laws.gravity`; None if a support holds parts.
+        """Return the gravity between two states of some evidence, as `Laws.gravity`; None if a support holds parts.
 
         Only states up to the last one are used, and of a long record only some.
         """
@@ -203,7 +204,7 @@ class GrowingEvidence:
         return laws.gravity(start, so_far.time.size - 1)
 
     def free_since(self, time: float) -> float:
-        """Return the start of the time without force up to a time; the time itself without states."""
+        """Return when the force-free time that lasts up to a time began; without states, return that time itself."""
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
@@ -246,7 +247,7 @@ class GrowingEvidence:
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
         """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
 
-        A stretch that goes on ends with the record.
+        The last of these periods may last to the end of the record.
         """
         momenta = find_momenta(self.history, of_parts=True)
         if momenta is None:
@@ -264,7 +265,7 @@ class GrowingEvidence:
 
 
 def highest_energy(history: History, start: float, end: float) -> float:
-    """Return the state from ``start`` to ``end`` with the highest internal energy, the last of equal ones [time]."""
+    """Return the last time from ``start`` to ``end`` at which the internal energy has its maximum [time]."""
     time, energy = history.between(start, end)
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
@@ -272,14 +273,14 @@ def highest_energy(history: History, start: float, end: float) -> float:
 def range_of_energy(
     history: History, now: float, wait: float
 ) -> tuple[float, float, float]:
-    """Return lowest and highest internal energy within the last wait, and the lowest one that is good for tr."""
+    """Return the lowest and highest internal energy within the last wait, and the lowest energy that is good for tr."""
     energy = history.between(now - wait, now)[1]
     low, high = float(energy.min()), float(energy.max())
     return low, high, low + _HIGH * (high - low)
 
 
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
-    """Return a flight with the end seen by another witness, if its own witness ended at ``last_time`` in it."""
+    """Return a flight whose own evidence ended at ``last_time`` with the end that other evidence shows."""
     if flight.end is not None:
         return flight
     ends = (
@@ -294,14 +295,14 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
 def _get_contact_energy(
     balance: Balance | None, time: Samples, states: slice = slice(None)
 ) -> Samples | None:
-    """Return the energy of all contacts at some ``states`` of these times; None if it is not written at them."""
+    """Return the contact energy at the ``states`` of these times; None if the file does not contain it there."""
     if balance is None or balance.sliding is None or balance.time.size != time.size:
         return None
     return balance.sliding[states]
 
 
 def _list_sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts that may fly together: chosen parts, chosen and connected parts, all parts.
+    """Yield the sets of parts that may fly together: the chosen parts, these with all connected parts, and all parts.
 
     Parts are given by their numbers in the momenta.
     """

@@ -1,4 +1,4 @@
-"""Print the cards of a first run that switches itself: the solver detects flights by contact forces.
+"""Print the cards of a first run that switches its parts by itself: the solver detects flights by contact forces.
 
 Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
@@ -43,11 +43,12 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
-# Number of engine files from which the OpenRadioss starter reads /RBODY/OFF; a leg after the end takes one step.
+# The OpenRadioss starter reads /RBODY/OFF from this many engine files. A leg after the end of the run takes one step.
 _MOST_LEGS: Final = 9
-# The largest step while rigid is the wait divided by this number, so a contact is seen at most that late.
+# While the parts are rigid, the largest time step is the wait divided by this number.
+# A contact is therefore noticed at most one such step late.
 _STEPS_PER_WAIT: Final = 300
-# LS-DYNA: time after a switch in which a contact does not release the parts, as the wait divided by this number.
+# LS-DYNA: after a switch no contact releases the parts for a time of the wait divided by this number.
 _DELAYS_PER_WAIT: Final = 100
 # Radioss: loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
@@ -71,10 +72,10 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
-# LS-DYNA: loads that act without a contact, and those of them that are gravity.
+# LS-DYNA. First: loads that act without a contact. Second: the keywords among these that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA: offset before a contact relative to the thickest shell.
-# It must exceed the thickness of the contact, which is half of the thickness of each shell.
+# LS-DYNA: offset before a contact, in thicknesses of the thickest shell.
+# It must exceed the contact thickness, which is half of the thickness of each shell.
 _OFFSET_THICKNESSES: Final = 2
 
 
@@ -92,27 +93,27 @@ def first_card(
     wait: float | None = None,
     after: float | None = None,
 ) -> First:
-    """Print the cards with which the first run of a deck switches itself.
+    """Print the cards with which the first run of a deck switches its parts by itself.
 
     Parameters
     ----------
     path : str
         Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
     parts : collection of int
-        Parts to be switched; Radioss: by default those of the bodies that the engine file puts off.
+        Parts to be switched; Radioss: by default the parts of the bodies that the engine file deactivates.
     wait : float, optional
-        Time without force that counts as flight [time]; by default half of the longest inner period by the deck.
+        Force-free time that shows a flight [time]; by default half of the longest period of the deck's springs.
     after : float, optional
-        Nothing becomes rigid before [time].
+        No part becomes rigid before this time [time].
 
     Raises
     ------
     DeckError
-        If the deck has no contact that shows a flight, or something else than contacts and gravity acts on the parts.
+        If the deck has no contact that shows a flight, or if other loads than contacts and gravity act on the parts.
     RangeError
         If the wait is below half of a period that is known.
     ArgumentError
-        If the deck tells no wait, or no parts.
+        If the wait or the parts are not given and do not follow from the deck.
     """
     inventory = read_inventory(path)
     chosen = tuple(parts)
@@ -130,7 +131,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given wait, or half of the longest inner period of the deck; ArgumentError without either."""
+    """Return the given wait, or half of the longest period in the deck; raise ArgumentError without either."""
     if given is not None:
         check_wait(given, wait_of_deck(inventory), path)
         return Wait(given, "given", "as given")
@@ -156,7 +157,7 @@ def _make_radioss_card(
     wait: Wait,
     after: float | None,
 ) -> First:
-    """Print the engine files and sensors of a Radioss run; DeckError if a flight would not show by contact forces."""
+    """Print the engine files and sensors of a Radioss run; raise DeckError if contact forces cannot show a flight."""
     run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
@@ -191,7 +192,7 @@ def _refuse_loads(starter: Starter) -> None:
 def _falls_from_rest(
     run: RadiossRun, inventory: Inventory, parts: Collection[int]
 ) -> bool:
-    """Return True if the parts are initially at rest without support, and gravity acts on them."""
+    """Return True if the parts are initially at rest and unsupported, and gravity acts on them."""
     if run.starter is None or run.starter.named("INIVEL"):
         return False
     if any(leg.starts for leg in run.legs):
@@ -200,7 +201,7 @@ def _falls_from_rest(
 
 
 class _Sensors(NamedTuple):
-    """The cards of the sensors, and the ids of the sensor of a contact force and of a flight."""
+    """The sensor cards, the id of the sensor that detects a contact force, and that of the sensor for a flight."""
 
     text: str
     contact: int
@@ -210,7 +211,7 @@ class _Sensors(NamedTuple):
 def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
-    """Write sensors of a contact force within the wait, and of a flight without such a force."""
+    """Write a sensor that detects a contact force within the wait, and a sensor that detects a flight."""
     cards: list[str] = []
     for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
         row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
@@ -241,7 +242,7 @@ def _write_legs(
     *,
     at_rest: bool,
 ) -> dict[str, str]:
-    """Write the engine files, deformable and rigid alternately; rigid first if the parts fall from rest."""
+    """Write the engine files, alternately deformable and rigid. The first one is rigid if the parts fall from rest."""
     (leg,) = run.legs
     other_nodes = tuple(
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
@@ -282,7 +283,7 @@ def _make_ls_dyna_card(
     wait: Wait,
     after: float | None,
 ) -> First:
-    """Print the switch sets of an LS-DYNA run; DeckError if a flight would not show by the force of one contact."""
+    """Print the switch sets of an LS-DYNA run; raise DeckError if the force of one contact cannot show a flight."""
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)
@@ -321,7 +322,7 @@ def _make_ls_dyna_card(
 
 
 def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
-    """Return id and keyword of the one contact that a switch can wait for; DeckError without one or if loads act."""
+    """Return id and keyword of the contact that a switch can wait for; raise DeckError without one or if loads act."""
     for card in deck.cards:
         if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
             raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
@@ -339,7 +340,7 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
 
 
 def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
-    """Return the distance of the surfaces at which the parts become deformable again [length], with a note."""
+    """Return the gap between the surfaces at which the parts become deformable again [length], with a note."""
     sections = [part.section for part in inventory.parts.values()]
     thickest = max(
         (section.thickness for section in sections if section.thickness), default=0.0

@@ -2,7 +2,7 @@
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
-shorter wait treats such a gap as flight, and a body that is frozen in it never makes the push that was to come.
+shorter wait treats such a gap as a flight, and a body frozen in it cannot rebound as it would have done.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 
 # A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
-# An oscillation is measured from 10 % to 90 % of its way, since its ends may be flat.
-# A harmonic motion takes this share of half its period for that.
+# First: share of an oscillation at each end that is not used to measure it, since its ends may be flat.
+# Second: share of half its period that a harmonic motion takes for the rest.
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# An oscillation with less than this share of the strongest mean force so far is a rotation of the body.
+# An oscillation whose mean force is below this share of the strongest one so far is a rotation of the body.
 _ROTATION: Final = 0.05
-# An oscillation with fewer states is a jump, as of an energy in the first state.
+# A change within fewer states is a jump, not an oscillation, such as the jump of an energy after the first state.
 _FEWEST_STATES: Final = 4
 # A part oscillates only if its relative velocity exceeds this share of the velocity of all parts.
 _AT_REST: Final = 1e-3
-# An oscillation that lasts this many times the longest half period before it may continue for any time.
+# How an oscillation ends is unknown once it lasts this many times the longest half period before it.
 _MUCH_LONGER: Final = 2.0
-# Limits in half periods according to the deck: a longer free oscillation is the rotation of a body.
-# A forced oscillation is limited to the second value.
+# Longest oscillations, in half periods according to the deck. A longer one is a rotation of the body.
+# The first value is for free oscillations, the second for those under a load.
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# A period is known to 10 %, so a given wait may be this share of half the period.
+# Periods are uncertain by 10 %, so a given wait may be as short as this share of half the period.
 _EXACT: Final = 0.9
 # Parts with a smaller share of the mass hardly move the other parts.
 _HEAVY: Final = 0.05
@@ -63,7 +63,7 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an inner motion from ``begin`` to ``end``, which is known at ``seen_at`` [time].
+    """Half a period of an inner motion, from ``begin`` to ``end``; it was detected at the time ``seen_at`` [time].
 
     ``half`` is half of its period [time], ``strength`` its mean change by time, 0 if that is less than a swing.
     """
@@ -97,7 +97,7 @@ class _Motion:
             name: GrowingColumn() for name in ("time", "values", "least_swing")
         }
         self._lowest, self._highest = np.inf, -np.inf
-        # State of the last turn, None before any motion, and of the extreme value since then.
+        # State at the last turning point (None before any motion), and at the extreme value since then.
         self._turn: int | None = None
         self._extreme, self._rising = 0, False
         self._first_moved: float | None = None  # time of the first motion [time]
@@ -115,7 +115,7 @@ class _Motion:
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,) and return the half periods completed by them, of at least ``least_swing`` (k,)."""
+        """Append states (k,) and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
         lows = np.minimum(np.minimum.accumulate(values), self._lowest)
         highs = np.maximum(np.maximum.accumulate(values), self._highest)
         self._lowest, self._highest = float(lows[-1]), float(highs[-1])
@@ -148,7 +148,7 @@ class _Motion:
     def _follow(
         self, state: int, value: float, least_swing: float, extreme_value: float
     ) -> _HalfPeriod | None:
-        """Follow the motion by a state; return a half period once values went back by ``least_swing`` after its end."""
+        """Follow the motion to a state; return a half period once values have gone back by ``least_swing`` after it."""
         goes_on = value >= extreme_value if self._rising else value <= extreme_value
         if goes_on:
             self._extreme = state
@@ -170,7 +170,7 @@ class _Motion:
     def _measure(
         self, begin: int, end: int, state: int, least_swing: float
     ) -> _HalfPeriod:
-        """Measure the half period between two states, which is known at a third one."""
+        """Measure the half period between two states; it is detected at a third state."""
         time = self._columns["time"].rows
         values = self._columns["values"].rows[begin : end + 1]
         distance = np.abs(values - values[0])
@@ -236,7 +236,7 @@ class InnerMotion:
             self._least = Wait(before, "record", "as in the flight before")
         self._evidence = GrowingEvidence()
         self._part_motions: list[_Motion] = []
-        # Motions that still continue, by the indices of part and axis.
+        # Motions that still continue, keyed by the indices of part and axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._heavy: tuple[int, ...] = ()
@@ -246,7 +246,7 @@ class InnerMotion:
         self._longest_of_energy: list[_Longest] = []
 
     def take(self, states: History, evidence: GrowingEvidence) -> None:
-        """Append states that the ``evidence`` has taken already."""
+        """Append states that the ``evidence`` already contains."""
         self._evidence = evidence
         for momenta in states.momenta:
             if momenta.parts is not None and momenta.masses is not None:
@@ -289,7 +289,7 @@ class InnerMotion:
                         yield swing, motion
 
     def _get_motion(self, momenta: Momenta, number: int, axis: int) -> _Motion:
-        """Return the motion of a part along an axis; a new one if it has begun to move or to deform again."""
+        """Return the motion of a part along an axis. A part that starts to move or deforms again gets a new motion."""
         assert momenta.parts is not None
         if (number, axis) not in self._going_on:
             motion = _Motion(momenta.parts[number].name)
@@ -307,7 +307,7 @@ class InnerMotion:
         yield from self._energy.add(states.time, states.energy, _AT_REST * largest)
 
     def _learn(self, swing: _HalfPeriod, motion: _Motion) -> None:
-        """Lengthen the wait by a completed half period, unless it was a rotation or disturbed by a push.
+        """Lengthen the wait if a completed half period requires it, unless this was a rotation or disturbed by a push.
 
         A pushed swing counts if there is no deck and this motion has not swung without a push before.
         """
@@ -340,7 +340,7 @@ class InnerMotion:
         so_far.append(longest)
 
     def needed(self, start: float, now: float) -> float | None:
-        """Return the wait for a flight since ``start``, from the states up to ``now`` [time]; None if unknown.
+        """Return the wait for a flight that began at ``start``, from the states up to ``now`` [time]; None if unknown.
 
         Raises
         ------
@@ -380,13 +380,13 @@ class InnerMotion:
         return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
-        """Return the longest half period known ``now``, also if a push lengthened it [time]."""
+        """Return the longest half period known ``now``, even if a push lengthened it [time]."""
         longest = self._get_longest(now)
         of_record = longest.swing if longest else 0.0
         return max(of_record, self._least.time if self._least else 0.0)
 
     def _get_longest(self, now: float) -> _Longest | None:
-        """Return what was known at a time: from the parts, or from the energy while no part moves."""
+        """Return the longest half period known at a time: from the parts, or from the energy while no part moves."""
         has_parts = any(motion.begins <= now for motion in self._part_motions)
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         count = bisect_right(so_far, now, key=lambda longest: longest.since)
@@ -406,7 +406,7 @@ class InnerMotion:
         return largest[0] <= _ROUND_OFF * max(largest)
 
     def _has_long_ongoing_swing(self, now: float) -> bool:
-        """Return True if an unfinished oscillation is much longer already than all before it."""
+        """Return True if an unfinished oscillation is already much longer than all earlier ones."""
         longest = self._get_longest(now)
         strongest = longest.strength if longest else 0.0
         motions = [
@@ -426,7 +426,7 @@ class InnerMotion:
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
-    """Return half of the longest period of the springs of a deck; None if the deck does not define it."""
+    """Return half of the longest period of a deck's springs; None if the deck does not define it."""
     period = find_inner_period(inventory)
     if period is None:
         return None
@@ -447,6 +447,6 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
 
 
 def _find_last_extreme(values: Samples) -> int:
-    """Return the last state at which values (n,) are farthest from their last one."""
+    """Return the state at which values (n,) differ most from the last value; if there are several, the last of them."""
     distance = np.abs(values - values[-1])
     return int(np.flatnonzero(distance == distance.max())[-1])

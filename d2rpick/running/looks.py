@@ -1,6 +1,6 @@
 """Read the files of a run repeatedly while it is computed, and return the new states.
 
-Of the histories of solvers only the last states are read again.  Files of other formats are read as a whole each time.
+Only the last states of a solver's histories are read again.  Files of other formats are read completely each time.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class Looks:
     ) -> None:
         self._selection, self._inventory = selection, inventory
         self._last_states: list[Table] = []
-        # Where the next look reads on, by file, and all files of the last look.
+        # For each file, where the next read continues, and all files of the last read.
         self._resume_points: dict[str, ResumePoint] = {}
         self._names: frozenset[str] = frozenset()
 
     @property
     def grow(self) -> bool:
-        """Return True if the next look reads the last states only."""
+        """Return True if the next read covers only the last states."""
         return bool(self._resume_points)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
@@ -58,7 +58,8 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            self._resume_points, self._last_states = {}, []  # the file no longer exists
+            # A file no longer exists, so all files are read from their start.
+            self._resume_points, self._last_states = {}, []
         history = self._read_on(names)
         new_states = None
         if history is not None:
@@ -83,10 +84,10 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, including the known ones, and all of new files.
+        """Read the last states of each file, including known states, and new files completely.
 
-        Files without a point, as those with forces only, are not read again.  Return None if a file cannot be read from
-        its point, as when it was written anew.
+        Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
+        be read from its resume point, as when it was written anew.
         """
         if not self._resume_points:
             return None

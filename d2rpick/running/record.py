@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Initial number of rows of a column.
+# Number of rows for which a new column has room.
 _FEWEST_ROWS: Final = 64
-# States that are so many printed digits apart do not get the same time.
+# Two states whose times differ by more than this many units of the last printed digit are different.
 _APART: Final = 1.5
-# Tolerance of values that are read twice, as a share of the largest one.  A sum over parts may end in other digits, and
-# the energy of springs is left out of an energy only if they have any in the states that are read together.
+# Tolerance for values that are read twice, as a share of the largest value. A sum over parts may end in other digits.
+# The energy of springs is left out of an energy only if springs have energy in the states that are read together.
 _SAME: Final = 1e-9
 
 
@@ -60,7 +60,7 @@ class GrowingRecord:
         self._history: History | None = None
 
     def add(self, states: History) -> None:
-        """Append states, which have the quantities of the states so far."""
+        """Append states, which must have the same quantities as the states so far."""
         tables = list_tables(states)
         self._latest_tables = tables
         arrays = [_get_arrays(table) for table in tables]
@@ -100,7 +100,7 @@ def list_tables(history: History) -> list[Table]:
 
 
 def _join_tables(tables: Sequence[Any]) -> History:
-    """Return the history of which these are the tables, in the order of `list_tables`."""
+    """Build a history from its tables, which are in the order of `list_tables`."""
     history, *evidence = tables
     momenta_count = len(history.momenta)
     momenta, balances = evidence[:momenta_count], evidence[momenta_count:]
@@ -111,7 +111,7 @@ def _join_tables(tables: Sequence[Any]) -> History:
 
 
 def hold_back_states(history: History) -> History:
-    """Return a history without a last state that a later one may replace, since both are printed with the same time."""
+    """Return a history without its last state, if a later state with the same printed time may still replace it."""
     first, *evidence = list_tables(history)
     settled: list[Any] = [_drop_unsettled(first, history.time_precision)]
     for table in evidence:
@@ -121,7 +121,7 @@ def hold_back_states(history: History) -> History:
 
 
 def _drop_unsettled(table: Table, precision: Precision) -> Table:
-    """Return a table without its last state if the two last times are as near as they can be printed."""
+    """Return a table without its last state if its last two times are as close as printed times can be."""
     quantum = precision.quantum(float(table.time[-1])) if table.time.size else 0.0
     if table.time.size < 2 or table.time[-1] - table.time[-2] > _APART * quantum:
         return table
@@ -129,7 +129,7 @@ def _drop_unsettled(table: Table, precision: Precision) -> Table:
 
 
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; for an empty table that of the tables ``before``."""
+    """Return the last state of each table of a history; for an empty table, the last state in the tables ``before``."""
     tables = list_tables(history)
     last_states: list[Any] = []
     for number, table in enumerate(tables):
@@ -141,7 +141,7 @@ def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
 
 
 def skip_states(history: History, last_states: Sequence[Table]) -> History | None:
-    """Return the states of a history after the known last ones; None if it does not contain these.
+    """Return the states of a history after the known last states; None if the history does not contain these.
 
     ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
     """
@@ -158,7 +158,7 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
 
 def _count_known_states(table: Table, last_state: Table) -> int | None:
-    """Return the states of a table up to the last one that was known; None if that is not in it."""
+    """Count the states of a table up to the last known state; None if the table does not contain that state."""
     arrays, last_values = _get_arrays(table), _get_arrays(last_state)
     if arrays.keys() != last_values.keys():
         return None

@@ -1,4 +1,4 @@
-"""Choose the next leg of a first run that switches itself, from the results of the legs so far.
+"""Choose the next leg of a first run that switches its parts by itself, from the results of the legs so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
 machine is.  A leg that replaces a discarded one gets its number.
@@ -15,22 +15,24 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Kinds of legs: deformable; rigid, in which the flight may end; rigid, computed again up to the td now known.
+# Kinds of legs. "load": deformable. "probe": rigid, and the flight may end in it.
+# "rigid": a probe that is computed again, up to td, which is then known.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are equal if they differ by less than this number of states: a history may end one state early.
 _STATES: Final = 1.5
-# The solver numbers legs from 1 to 99. With 10 left no further flight is switched, so that the run reaches its end.
+# First: the solver numbers legs from 1 to 99. Second: once only this many numbers are left,
+# no further flight is switched, so that the run reaches its end.
 _MOST_LEGS, _KEPT_BACK = 99, 10
-# Shortest deformable leg in a flight, as a share of the wait: one of its two ends has the higher energy.
+# Shortest deformable leg in a flight, as a share of the wait. tr is the end of the leg that has the higher energy.
 _LEAST: Final = 0.25
 # Length of a deformable leg while the wait is unknown, as a share of the run.
 _UNKNOWN: Final = 0.02
-# Smallest length of a probe, as shares of its rigid time so far and of the run.
-# A longer probe computes more after the contact, a shorter one needs more restarts.
-# Each of them costs a few percent of a deformable flight.
+# Smallest length of a probe, as a share of its rigid time so far (first) and of the run (second).
+# A longer probe computes more after the contact, and a shorter one needs more restarts.
+# Either costs a few percent of a deformable flight.
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
-# Cost of writing and reading a restart, in deformable cycles (about 5 were measured).
+# Assumed cost of writing and reading a restart, in deformable cycles (measured: about 5).
 _RESTART: Final = 10
 # Shortest flight that is switched, in half periods of its slowest vibration.
 # A vibrating body touches the ground at another time than a frozen one.
@@ -43,7 +45,7 @@ _WORTH: Final = 0.04
 
 
 class Limits(NamedTuple):
-    """Limits that all legs keep [time].
+    """Limits that apply to all legs [time].
 
     ``interval`` is the interval of the history, ``shortest`` the least margin, ``margin`` the one the user gave.
     ``rigid_cycle`` is the cost of a cycle with rigid parts over the cost of a deformable cycle [-].
@@ -69,11 +71,11 @@ class Limits(NamedTuple):
 
     @property
     def same(self) -> float:
-        """Times that differ by less are equal [time]."""
+        """Difference below which two times are treated as equal [time]."""
         return _STATES * self.interval
 
     def until_end(self, until: float) -> float:
-        """Return ``until``, or the end of the run if that is close enough [time]."""
+        """Return ``until``, or the end of the run if ``until`` is close to it [time]."""
         return until if until < self.end - self.same else self.end
 
 
@@ -95,25 +97,25 @@ class Order(NamedTuple):
         return self.kind in RIGID_KINDS
 
     def following(self, kind: str, until: float) -> Order:
-        """Return the order of a leg that continues from the end of this one."""
+        """Return the order for a leg that continues from the end of this leg."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
 class LegFindings(NamedTuple):
-    """Results of the record up to the end of a leg.
+    """What the record up to the end of a leg shows.
 
     Attributes
     ----------
     free : float
-        Time since which no force has acted [time].
+        Start of the current force-free time [time].
     wait : float or None
-        How long no force must act to count as flight [time]; None while nothing determines it.
+        Force-free time that shows a flight [time]; None while nothing determines it.
     why : str
-        Reason of the wait.
+        Why the wait has this length.
     flies : bool
-        Whether no force has acted for the wait.
+        True if no force has acted for as long as the wait.
     tr : float
-        End of the leg, its first or last, with the higher internal energy [time].
+        Start or end of the leg, whichever has the higher internal energy [time].
     idle : bool
         Whether the parts have never stored internal energy.
     short : tuple of (float, float)
@@ -125,7 +127,7 @@ class LegFindings(NamedTuple):
     steady_from : float
         Length of the flight below which a swinging part displaces the body by more than 1 % of its path [time].
     swing_warning : str
-        What the user is told of that part in a shorter flight; "" if there is none.
+        Warning about that part in a shorter flight, or "".
     """
 
     free: float = 0.0
@@ -175,14 +177,14 @@ class Window(NamedTuple):
 
 
 def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    """Choose the next leg; None when the run is over.
+    """Choose the next leg; None once the run is complete.
 
     Raises
     ------
     D2RPickError
         If the solver has no number for one more leg.
     """
-    if not legs:  # this number of states shows that parts at rest fall
+    if not legs:  # So many states show whether parts at rest fall.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last = legs[-1].order
     if last.rigid and legs[-1].findings.contact is not None:
@@ -206,7 +208,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
 
 
 def _follow_window(last: Order, leg: Leg, limits: Limits) -> Order:
-    """Order a deformable leg after td; the flight in which the window ends is not switched again."""
+    """Order a deformable leg after td. The flight in which the window ends is not switched again."""
     load = last.following(LOAD, _determine_load_end(leg, limits))
     return load._replace(switch_after=last.until)
 
@@ -232,7 +234,7 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def _determine_load_end(leg: Leg, limits: Limits) -> float:
-    """Return the end of the next deformable leg: when a present or past flight has lasted for the wait."""
+    """Return when the next deformable leg ends: as soon as a current or past flight has lasted for the wait."""
     now, findings = leg.order.until, leg.findings
     legs_left = _MOST_LEGS - _KEPT_BACK - leg.order.number
     if legs_left <= 0:
@@ -255,7 +257,7 @@ def _determine_load_end(leg: Leg, limits: Limits) -> float:
 def _determine_probe_end(
     legs: Sequence[Leg], tr: float, now: float, limits: Limits
 ) -> float:
-    """Return the end of a leg that begins ``now`` in a probe that began at ``tr``."""
+    """Return the end of the next leg of a probe that began at ``tr``; the leg begins ``now``."""
     length = max(
         get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * (now - tr),
@@ -266,7 +268,7 @@ def _determine_probe_end(
 
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order the leg that ends the window at its td; if the window does not pay, a deformable leg in its place."""
+    """Order the leg that ends the window at its td. If the window does not pay off, order a deformable leg instead."""
     window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
     findings = get_flight_findings(legs)
     if window.reason:
@@ -305,7 +307,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
         for order in collect_joined_legs(legs[-1].order, legs)
         if 0 <= td - order.until <= limits.same
     ]
-    td = max(leg_ends, default=td)  # no leg of less than two states
+    td = max(leg_ends, default=td)  # A leg must have at least two states.
     reason = _explain_too_little_saved(legs, td - tr, limits)
     if not findings.idle and flight < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
@@ -315,9 +317,9 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
 def _explain_too_little_saved(
     legs: Sequence[Leg], rigid_time: float, limits: Limits
 ) -> str | None:
-    """Explain why a window does not pay for its probe and restarts; None if it does.
+    """Explain why a window saves less than its probe and restarts cost; None if it saves more.
 
-    Cycles decide, since CPU times differ each time and the same command must compute the same run.
+    The comparison uses cycles, because CPU times vary and the same command must compute the same run.
     """
     if rigid_time <= 0:
         return "its margin begins before tr"
@@ -331,7 +333,7 @@ def _explain_too_little_saved(
 
 
 def _count_deformable_cycles(legs: Sequence[Leg]) -> float:
-    """Return the deformable cycles per time, over all legs so far [1/time]; infinity if there are none."""
+    """Return the number of deformable cycles per unit of time, over all legs so far [1/time]; infinity without any."""
     deformable = [leg for leg in legs if not leg.order.rigid and leg.cycles]
     if not deformable:
         return float("inf")
@@ -341,7 +343,7 @@ def _count_deformable_cycles(legs: Sequence[Leg]) -> float:
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Return the legs up to and including a leg since the parts last became rigid or deformable."""
+    """Return the legs since the parts last became rigid or deformable, up to and including a given leg."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
     while (previous := latest.get(joined[0].number - 1)) and (
@@ -352,12 +354,12 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
-    """Return the leg in which the parts became rigid, if they are rigid in the last one."""
+    """Return the leg in which the parts became rigid, if they are still rigid in the last leg."""
     return collect_joined_legs(legs[-1].order, legs)[0]
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return what was seen of the flight when it was switched: at the end of the last deformable leg."""
+    """Return what was known about the flight when it was switched, at the end of the last deformable leg."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 

@@ -1,4 +1,4 @@
-"""Warn, before td is known, about parts that oscillate too much for their body to become rigid."""
+"""Warn about parts that oscillate so much that their body should not become rigid, before td is known."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class Swing(NamedTuple):
-    """An oscillating part: its ``name``, and the largest displacement of the body by it [length].
+    """An oscillating part: its ``name``, and how far it can displace the body [length].
 
     In a flight shorter than ``flight`` [time] the ``error`` is more than 1 % of the path, which is too much.
-    ``at_most``: both parts may turn instead, which displaces nothing.
+    ``at_most`` is True if the error is an upper limit, because both parts may rotate instead, which displaces nothing.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Swing(NamedTuple):
 
     @property
     def told(self) -> str:
-        """Sentence for the user before the body becomes rigid."""
+        """The warning that the user gets before the body becomes rigid."""
         motion, limit = "still moves relative to the others", "about"
         if self.at_most:
             motion, limit = "moves relative to the other, or both rotate", "at most"
@@ -40,10 +40,10 @@ class Swing(NamedTuple):
 
 
 def find_swing(history: History, start: float, tr: float) -> Swing | None:
-    """Find the largest displacement of a body by an oscillating part if it becomes rigid at ``tr``.
+    """Find how far an oscillating part can displace its body if the body becomes rigid at ``tr``.
 
     td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
-    if the momenta of parts are not enough to tell.
+    if the part momenta are not sufficient.
     """
     momenta = find_momenta(history, of_parts=True)
     if momenta is None or momenta.parts is None:
@@ -58,7 +58,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
 
 
 def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | None:
-    """Return the upper limit from the momenta of two parts alone; None if other parts move too."""
+    """Return an upper limit of the displacement from the momenta of two parts; None if other parts move too."""
     inside = find_window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
     if momenta.parts is None or masses is None or time.size < 2:
@@ -83,7 +83,7 @@ def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | Non
 def _make_swing(
     name: str, error: float, path: float, duration: float, *, at_most: bool = False
 ) -> Swing | None:
-    """Return the oscillation of a part with the path of the body in a flight so far; None without a path."""
+    """Return the oscillation of a part and the body's path in the flight so far; None if there is no path."""
     if path <= 0:
         return None
     return Swing(name, error, error / path / MOST_OF_PATH * duration, at_most)

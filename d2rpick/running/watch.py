@@ -1,6 +1,7 @@
 """Watch a run while it is computed, and report each event once.
 
-Nothing is started, stopped or changed.  The time to the next look is 100 times what a look costs: 1 % of a core.
+Nothing is started, stopped or changed.  The pause after each read is 100 times as long as the read, so that watching
+takes 1 % of a processor core.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 # Share of a processor core that reading may take.
 _SHARE: Final = 0.01
-# Shortest pause between two reads, and longest one if only new states are read [s].
+# First: shortest pause between two reads [s]. Second: longest pause if only new states are read [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run that writes nothing for this time is silent [s].
 _SILENT: Final = 60.0
@@ -73,7 +74,7 @@ class Watch:
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
-        """Return the events since the last read; none for a run that has not begun.
+        """Return the events since the last read; a run that has not begun has none.
 
         Raises
         ------
@@ -90,7 +91,7 @@ class Watch:
                 yield from self._read([name for name, _ in files], rewritten=rewritten)
                 self._error = None
             except (FormatError, HistoryError) as error:
-                self._error = error  # the file may be about to be written
+                self._error = error  # The solver may just be writing the file.
                 self._looks = Looks(self._selection, self._inventory)
         if files and not self.ended and self._last_time > float("-inf"):
             yield from self._check_end(files[-1][0])
@@ -166,7 +167,7 @@ class Watch:
             yield self._make_event(event, f"the run has ended {self.ended}")
 
     def _report_restart(self, kept_count: int, now: float) -> Iterator[Event]:
-        """Report that a run went back, and when to expect the contact that came after ``now`` before."""
+        """Report that a run restarted from an earlier time, and when to expect the contact seen after ``now``."""
         message = f"the run was restarted: it was at {self._last_time:.6g} and is now at {now:.6g}"
         yield Event("restart", now, now, message)
         for event in self._events[kept_count:]:
@@ -177,7 +178,7 @@ class Watch:
                 return
 
     def _make_event(self, event: str, message: str) -> Event:
-        """Return an event at the last state; a "state" has no time of its own."""
+        """Return an event at the last state. A "state" event has no separate time."""
         now = None if self._last_time == float("-inf") else self._last_time
         return Event(event, None if event == "state" else now, now, message)
 
@@ -200,7 +201,8 @@ def follow(
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
         if watch.reads_what_is_new:
-            pause = min(pause, _LONGEST)  # only the first read covers everything
+            # Only the first read covers all states, so later pauses are short.
+            pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()
         if remaining <= 0 or (watch.ended and lasting is None):
             yield watch.state()
@@ -217,7 +219,7 @@ def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
             raise
         return
     for path in (*paths, *find_later_legs(paths)):
-        with suppress(OSError):  # missing so far, or no longer there
+        with suppress(OSError):  # The file may not exist yet, or no longer.
             status = Path(path).stat()
             if status.st_size:
                 yield path, status
@@ -226,7 +228,7 @@ def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
 def _list_stamps(
     files: Sequence[tuple[str, os.stat_result]],
 ) -> list[tuple[str, int, int, int]]:
-    """Return the properties of each file that a write changes."""
+    """Return, for each file, the properties that change when it is written."""
     return [
         (name, status.st_ino, status.st_size, status.st_mtime_ns)
         for name, status in files

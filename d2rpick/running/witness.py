@@ -1,8 +1,8 @@
 """Find, for each state, the time without force on given parts or the model, from the states up to it.
 
-From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
-momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
-since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
+In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
+is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
+that ends may act again: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
 The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
 past the middle of the flight.
@@ -27,15 +27,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
 
-    # Function that returns the wait for a flight from ``start``, from the states up to ``now`` [time]; None if unknown.
+    # Returns the wait for a flight since ``start``, from the states up to ``now`` [time]; None if unknown.
     Needed = Callable[[float, float], float | None]
 
-# Tolerance of a constant momentum or contact energy, as a share of its largest value so far.
-# Sums in single precision have errors of 1/10 of it.
+# A momentum or contact energy is constant within this share of its largest value so far.
+# Sums in single precision have errors of 1/10 of this.
 CONSTANT: Final = 1e-4
 # After a force other than gravity, the next test waits for this share of the force-free time so far.
 _TEST_AGAIN: Final = 0.25
-# Most states of a long interval that are compared with the law: a force changes the momentum permanently.
+# A long interval is compared with the law at this many states. More are not needed,
+# because a force changes the momentum permanently.
 _MOST_COMPARED: Final = 128
 
 
@@ -45,23 +46,23 @@ class Quiet(NamedTuple):
     Attributes
     ----------
     start : float
-        Since when no force acted, as known at ``seen`` [time].
+        Start of the force-free time, as known at ``seen`` [time].
     seen : float
         State at which the wait was over [time].
     end : float or None
         First state at which a force acts [time]; None if the record ends before.
     wait : float
-        How long no force must act to count as flight [time].
+        Force-free time that shows a flight [time].
     source : str
         "momentum" or "contact-energy".
     left : float
-        What changes from ``start`` to ``seen``, as a share of the largest value so far [-].
+        Change of the momentum or contact energy from ``start`` to ``seen``, as a share of the largest value so far [-].
     gravity : float
         Acceleration, as in `FreeFlight`.
     parts : tuple of Part or None
         Parts that fly together; None for the whole model.
     level : float or None
-        When the centre of mass is as high again as at ``start`` [time]; None if that was before ``seen``.
+        Time at which the centre of mass is again as high as at ``start`` [time]; None if that was before ``seen``.
     """
 
     start: float
@@ -110,7 +111,7 @@ class GrowingWitness:
         self.members, self.parts, self.origin = members, parts, origin
         self.free: list[int] = []
         self.flights: list[Quiet] = []
-        # For each state, True if the written digits are sufficient to show a force.
+        # For each state, True if the printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         names = ("time", "momentum", "contact", "alone")
         self._columns = {name: GrowingColumn() for name in names}
@@ -155,14 +156,14 @@ class GrowingWitness:
             self.free.append(first)
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the unexplained change between two states relative to its tolerance; above 1 a force acts [-]."""
+        """Return the unexplained change between two states over its tolerance [-]. A force acts if this exceeds 1."""
         return max(
             law.misfit(first, last) / float(tolerance[last])
             for law, tolerance in self._laws
         )
 
     def last_without(self, first: int) -> int:
-        """Return the last state before a force appears, starting from ``first``."""
+        """Return the last state up to which no force has acted since ``first``."""
         return find_farthest(
             first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
         )
@@ -170,7 +171,7 @@ class GrowingWitness:
     def _find_first_without_force(self, last: int, first: int) -> int:
         """Return the first state at or after ``first`` without a visible force up to ``last``.
 
-        Steps double, so that the search takes few tests whether the state is near or far; a bisection ends it.
+        The step is doubled until it is too large, then bisected, so that few tests find a near or a far state.
         """
         if self.misfit(first, last) <= 1:
             return first
@@ -192,7 +193,7 @@ class GrowingWitness:
         needed: Needed,
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
-        """Add the flights that begin in the new states, and the ends of flights.
+        """Add the flights that are seen at the new states, and the ends of earlier flights.
 
         ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
         """
@@ -216,7 +217,7 @@ class GrowingWitness:
         self._tested_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: float, gravity: float | None) -> None:
-        """Add a flight since ``first`` that is seen at a state; without ``gravity``, set the time of the next test."""
+        """Add a flight since ``first`` that is seen at a state. Without ``gravity``, only set when to test again."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return

@@ -1,6 +1,6 @@
 """Identify the vibration: find the models that describe it, best first.
 
-Every measure of a pair (tr, td) needs the deformations at both times and how they lie to each other (`measures`).  The
+Every measure of a pair (tr, td) needs the deformations at both times and their relative direction (`measures`).  The
 energy does not show the sign of a deformation, so a model must.  `find_part_signs`, `span` and `find_models` look for
 them in this order, and `model.model_at` decides which one can be relied on at a td:
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-# Models by name, best first.
+# Names of the models, best first.
 MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
 
 
@@ -50,11 +50,11 @@ class VibratingTogether(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Return True if the energy is that of all parts that vibrate together."""
+        """Return True if the energy includes all parts that vibrate together."""
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return times and kinetic energies of the vibration in the flight, without the fall (n,); None if unknown."""
+        """Return times and kinetic energies (n,) of the vibration in the flight, without the fall; None if unknown."""
 
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 
 
 def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
-    """Read the signs of single parts in a window around td, if their energies are written; return them by name."""
+    """Find the signs of single parts in a window around td if their energies are written; return them by name."""
     from d2rpick.histories.samples import get_ends
 
     time = history.between(*around)[0]
@@ -73,7 +73,7 @@ def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
 
 @remember
 def _read_part_signs(history: History, first: float, last: float) -> SignedParts:
-    """Read the signs of single parts from their energies between two states, by their times."""
+    """Find the signs of single parts from their energies between the states at two times."""
     from d2rpick.histories.samples import find_window
     from d2rpick.vibration.part_signs import SignedParts
 
@@ -87,7 +87,7 @@ def _read_part_signs(history: History, first: float, last: float) -> SignedParts
 def find_models(
     history: History, flight: Span, settled: Span, *, together: VibratingTogether
 ) -> dict[str, SignedModel]:
-    """Look for models of the whole energy in a ``flight``, best first, until one tells the sign; return them by name.
+    """Search for models of the whole energy in a ``flight``, best first, until one gives the sign; return them by name.
 
     Swings are counted in the flight from when the energy has ``settled``, which may be before it.
     """
@@ -98,7 +98,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # modes may leave so much open that counted swings, if there are any, say more
+        # The modes may be so uncertain that counted swings, if there are any, are more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])
@@ -128,14 +128,14 @@ def _find_modal(
 
 @remember
 def _find_swings(history: History, first: float, last: float) -> Swings | None:
-    """Count the swings of the energy, provided that they return to a common minimum."""
+    """Count the half cycles of the energy if it returns to a common minimum in each of them."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(first, last))
 
 
 def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Use vague or doubtful modes, with a wide band, only if no other model gives the sign."""
+    """Use uncertain or doubtful modes, with a wide error band, only if no other model gives the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:
         return found

@@ -11,26 +11,26 @@ if TYPE_CHECKING:
 
 
 class SignedAmplitudes:
-    """A deformation known by the signed ``amplitudes`` of its modes or parts."""
+    """A deformation that is given by the signed ``amplitudes`` of its modes or parts."""
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return signed deformations, shape of ``t`` with an axis for modes or parts before it [sqrt(energy)]."""
+        """Return signed deformations, with the shape of ``t`` and a first axis for modes or parts [sqrt(energy)]."""
         raise NotImplementedError
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return the sum of the squared deformations, of the shape of ``t`` [energy]."""
+        """Return the sum of the squared deformations, with the shape of ``t`` [energy]."""
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the sum of q(tr) q(td), of the shape of ``tr``; ``td`` is a number, or one for each tr [energy]."""
+        """Return the sum of q(tr) q(td), with the shape of ``tr`` [energy]; ``td`` is a number, or one for each tr."""
         return np.asarray(
             np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr))
         )
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the sum of squared differences q(tr) - q(td), of the shape of ``tr`` [energy]."""
+        """Return the sum of squared differences q(tr) - q(td), with the shape of ``tr`` [energy]."""
         return np.asarray(np.sum(self.differences(tr, td) ** 2, axis=0))
 
     def differences(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
+        """Return q(tr) - q(td), with the shape of ``tr`` and a first axis for modes or parts [sqrt(energy)]."""
         return np.asarray((self.amplitudes(tr).T - self.amplitudes(td).T).T)

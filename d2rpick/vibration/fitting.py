@@ -1,4 +1,4 @@
-"""Fit the energy of one vibration mode to samples by least squares, without an initial guess from outside.
+"""Fit the energy of one vibration mode to samples by least squares; no initial guess is required.
 
 Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
 vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
-# Matrix pencil: the tried numbers of exponentials in q**2, lags, cells and rates.
+# Parameters of the matrix pencil, first the numbers of exponentials in q**2 that are tried.
 _ORDERS: Final = (
     3,
     4,
     6,
-)  # exponentials in q**2 of a plain vibration, with plastic work, and with a preload
+)  # for a plain vibration, with plastic work, and with a preload
 _LAGS: Final = 64  # 1/3 of the fewest cells, the optimum against noise
 _MIN_CELLS: Final = 192
 _MAX_CELLS: Final = 8192  # limits memory to 5 MB; enough for 1000 periods of the energy
@@ -48,21 +48,21 @@ COARSE: Final = 400  # number of samples for comparing and first refining the st
 _MEDIUM: Final = (
     2048  # number of samples on which a fit may be refused before all samples are used
 )
-_NEAR: Final = 1e-6  # relative gain below which a refusal is decided: negligible beside the structure
+_NEAR: Final = 1e-6  # a smaller relative gain cannot change a refusal
 MAX_MISFIT: Final = 0.4  # largest rms misfit over std(E): 16 % of the variance or more can hide another mode
 _FAR_TOO_MUCH: Final = (
     1.2  # safety factor: the variance of 2,000 samples is known to 3 %
 )
-STARTS: Final = 3  # most starts to refine: with noise the first one may not end best
+STARTS: Final = 3  # most starts to refine; the first may not be the best
 CERTAIN: Final = (
     0.01  # unexplained share of the variance below which no second start is tried
 )
 _MAX_STEPS: Final = 40
-# Rate over the record below which a fit to some of the samples is a drift, 1/10 period: of 1,100 such fits none
-# reached a third of a period, or followed the samples any better, when it was refined for all of them.
+# A fit to some of the samples is a drift if it has less than 1/10 period in the record. Of 1,100 such fits, none
+# reached 1/3 of a period or followed the samples better when it was refined with all samples.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
-# A parameter with smaller derivatives, for energies of about 1, has no effect; their squares underflow.
+# A parameter with smaller derivatives (for energies of about 1) has no effect, and their squares underflow.
 _NO_EFFECT: Final = 1e-100
 MAX_STRUCTURE: Final = (
     0.02  # share of std(E), 30 times what one real solver leaves with one mode
@@ -70,7 +70,7 @@ MAX_STRUCTURE: Final = (
 # A misfit has structure if its covariance is this many standard deviations above white noise, and clear structure
 _DEVIATIONS: Final = 3.0
 _BEYOND_DOUBT: Final = 6.0
-# Standard deviations above white noise beyond which a misfit has structure, and beyond which this is certain.
+# Structure further above white noise than this, in standard deviations, is certain.
 _BEYOND_STRUCTURE: Final = 2.0
 
 
@@ -95,7 +95,7 @@ def fit_few(
 def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
-    """Return the parameters for all samples from those of `fit_few`; None under the conditions of `fit_all`."""
+    """Fit all samples, starting from the parameters of `fit_few`; None under the conditions of `fit_all`."""
     best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
@@ -113,7 +113,7 @@ def fit_all(
     e: Samples,
     worst: float,
 ) -> Samples | None:
-    """Return the best fit to all samples, started from the ``best`` fit to a selection of them.
+    """Return the best fit to all samples, starting from the ``best`` fit to a selection of them.
 
     None without a start, or if ``worst`` is finite and some of the samples are left with too much structure.  A fit
     that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
@@ -133,7 +133,7 @@ def fit_all(
 
 
 def _is_drift(parameters: Samples) -> bool:
-    """Return True if the rate is so low that more samples do not make a vibration of it."""
+    """Return True if the rate is so low that the fit remains a drift even with all samples."""
     return bool(abs(parameters[0]) < _DRIFT)
 
 
@@ -146,7 +146,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Return the best of the refined starts; None if each leaves more than ``worst`` of the variance."""
+    """Refine the starts and return the best result; None if each leaves more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance
@@ -177,7 +177,7 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Compute the singular vectors, those with the largest share of E first."""
+        """Compute the singular vectors, beginning with the largest share of E."""
         running = integrate_by_trapezia(s, e)
         fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
@@ -203,7 +203,7 @@ class Pencil(NamedTuple):
 
 
 def find_factors(vectors: Samples) -> NDArray[np.complex128]:
-    """Return the factors z of exponentials z**k from ``vectors`` that span their windows over k, shape (n, order).
+    """Return the factors z of exponentials z**k; ``vectors`` (n, order) span the windows of these over k.
 
     A shift by one maps the space of the windows to itself; the factors are the eigenvalues.
     """
@@ -234,7 +234,7 @@ def _find_starts(
         alpha = np.concatenate((alpha, 2 * alpha))
     alpha = np.maximum(
         alpha, -1.0
-    )  # growth is refused later; this keeps exp from overflowing
+    )  # The limit keeps exp from overflowing; growth is refused later.
     vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
     square = vibration * vibration
     rows = [
@@ -264,7 +264,7 @@ def _find_starts(
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
-        # two starts within half a radian over the record lead to the same minimum
+        # Two starts whose rates differ by less than half a radian over the record lead to the same minimum.
         if all(
             abs(start[0] - start_before[0]) > 0.5
             or abs(start[1] - start_before[1]) > 0.5
@@ -276,7 +276,7 @@ def _find_starts(
 
 @np.errstate(
     over="ignore", invalid="ignore"
-)  # a trial step that is too large is rejected
+)  # overflow is ignored, because a trial step that is too large is rejected
 def refine_parameters(
     parameters: Samples,
     model: Model,
@@ -291,9 +291,7 @@ def refine_parameters(
     squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
     ``doomed``.
     """
-    damping = (
-        1e-4  # relative to the unit diagonal: the starts are good, so steps may be long
-    )
+    damping = 1e-4  # relative to the unit diagonal; small, since the starts are good
     cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
     free = gradient.size
     for steps_left in range(_MAX_STEPS, 0, -1):
@@ -357,7 +355,7 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the root of the covariance of neighbours in ``rest`` above ``deviations`` of white noise.
+    """Return the rms of what neighbours in ``rest`` share, beyond ``deviations`` standard deviations of white noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """
@@ -373,7 +371,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
 
 def has_clear_structure(rest: Samples, spread: float) -> bool:
-    """Return True if the misfit on evenly spaced samples shows too much structure for all samples.
+    """Return True if the misfit on evenly spaced samples has so much structure that all samples would refuse the fit.
 
     ``spread`` is the standard deviation of the energy there.
     """

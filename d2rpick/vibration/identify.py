@@ -27,16 +27,17 @@ if TYPE_CHECKING:
 # Structure is the part of the misfit that neighbouring samples share.
 HOPELESS: Final = (
     0.5**2
-)  # unexplained share of the variance of 400 samples: six standard deviations beyond MAX_MISFIT
-MAX_LOCAL_STRUCTURE: Final = (
-    0.1  # share of the fitted energy at the same time: a second mode with less damping
-)
-MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
-MIN_SAMPLES_PER_PERIOD: Final = 10  # samples per energy period pi / omega: with fewer, an aliased fast mode looks slow
+)  # unexplained share of the variance of 400 samples, six standard deviations above MAX_MISFIT
+# A residual above this share of the fitted energy at the same time shows a second, less damped mode.
+MAX_LOCAL_STRUCTURE: Final = 0.1
+MIN_SAMPLES: Final = 24  # four for each parameter of the largest model
+# Samples per energy period pi / omega. With fewer samples, aliasing makes a fast mode look slow.
+MIN_SAMPLES_PER_PERIOD: Final = 10
 MAX_GROWTH: Final = (
-    0.3  # -alpha x record length: noise hides at most this growth of a free vibration
+    0.3  # -alpha x record length: noise may make a vibration seem to grow by this
 )
-MIN_PLASTIC: Final = -0.05  # share of the energy range: plastic work is positive except for the scatter of its fit
+# Share of the energy range. Plastic work is positive, apart from fitting errors.
+MIN_PLASTIC: Final = -0.05
 MAX_OF_SPRING: Final = (
     0.1  # misfit of a vibration through zero with a stiffening spring
 )
@@ -44,7 +45,7 @@ _OF_A_PRELOAD: Final = (
     0.03  # share of the vibration energy that increases a residual of 0.2 to 0.4
 )
 
-# Free parameters of the models, the simplest first, and the periods that are needed to distinguish the models.
+# For each model, the simplest first: its number of free parameters, and the periods needed to identify it.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -58,11 +59,11 @@ class Identification(NamedTuple):
     Parameters
     ----------
     mode : Mode or None
-        Least-squares fit, also when it was refused; None when nothing could be fitted.
+        The least-squares fit, even if it was refused; None if nothing could be fitted.
     describes_record : bool
         True when the fit was accepted.
     reason : str or None
-        Why it was refused.
+        Why the fit was refused.
     misfit : float or None
         rms(E - fit) / std(E) over the window [-].
     rms : float
@@ -76,7 +77,7 @@ class Identification(NamedTuple):
     vibration : float
         Root mean square of the vibration energy over the window [energy]; NaN without a mode.
     hidden_share : float
-        Of the vibration energy, what a further mode may hold unseen; zero where none was looked for [-].
+        Share of the vibration energy that a hidden further mode may have [-]; zero if none was searched for.
     follows : bool
         Whether the fit follows the samples, plausible or not.
     plausible : bool
@@ -164,7 +165,7 @@ def identify(
     )
     if (
         quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # all other fits leave a larger misfit than the richest model
+    ):  # All other fits leave a larger misfit than the largest model.
         return _is_out_of_reach(time)
     fits = (
         (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
@@ -181,7 +182,7 @@ def identify(
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
     """Return the complex rates of the exponentials that E may contain, in units of the record's length, shape (k,).
 
-    A record that has too little for any judgement has none.
+    A record that is too short to be judged has none.
     """
     if _refuse_short_record(time, energy):
         return np.zeros(0, np.complex128)
@@ -192,7 +193,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge fits with their fewest periods, the simplest first; else return the best refused fit.
+    """Judge the fits, the simplest first, and return the first that follows the samples, else the best refused fit.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
@@ -211,7 +212,7 @@ def _choose_first_to_follow(
 def _prefer_through_zero(
     found: Identification, simple: list[Identification]
 ) -> Identification:
-    """Replace a vibration about a preload by one of half its rate that passes zero, if both fit almost alike.
+    """Replace a vibration about a preload with one through zero at half its rate, if both fit almost equally well.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
@@ -245,7 +246,7 @@ def _is_out_of_reach(time: Samples) -> Identification:
 def judge_given(
     mode: Mode, time: Samples, energy: Samples, *, quick: bool = False
 ) -> Identification:
-    """Compare a given mode with a record: it must follow the samples as closely as a fit.
+    """Compare a given mode with a record. It must follow the samples as closely as a fitted mode.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
     """
@@ -291,7 +292,7 @@ class _Record(NamedTuple):
         start = float(time[0])
         end = float(time[-1])
         scale = float(np.ptp(energy))
-        # older numpy versions warn of an overflow when dividing numbers this small, though the result is right
+        # Older numpy versions warn of an overflow when they divide numbers this small, although the result is correct.
         with np.errstate(over="ignore"):
             scaled = energy / scale
         return cls((time - start) / (end - start), scaled, start, end, scale)
@@ -305,7 +306,7 @@ class _Record(NamedTuple):
 
 
 def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
-    """Return a refusal of a record that is too short for a judgement, else None."""
+    """Return a refusal if the record is too short to be judged, else None."""
     if time.size < MIN_SAMPLES:
         states_text = "1 state" if time.size == 1 else f"{time.size} states"
         return _refuse_without_fit(
@@ -349,7 +350,7 @@ def _judge_attempt(
     e = record.e
     density = count_samples_per_period(
         s, attempt.scaled
-    )  # first, since it needs as much memory as everything after it
+    )  # This comes first, because it needs as much memory as all later steps.
     remainder = e - attempt.energy
     rms = float(np.sqrt(np.mean(remainder**2)))
     spread = float(np.std(e))
@@ -357,8 +358,8 @@ def _judge_attempt(
     local = attempt.scaled.vibration_energy(s)
     vibration = float(
         np.hypot.reduce(local) / np.sqrt(s.size)
-    )  # the norm avoids the overflow of squares
-    # if noise exceeds the vibration, a misfit does not show a further mode
+    )  # The norm avoids an overflow of squares.
+    # If noise exceeds the vibration, a misfit does not prove a further mode.
     np.maximum(local, max(rms, SOLVER_FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))
     loose = _explain_misfit(rms / spread, structure / spread, local_structure)
@@ -411,7 +412,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # mean interval around a random time of the record: gaps are weighted by their length
+    # Mean interval at a random time of the record, so that gaps are weighted by their length.
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
@@ -419,7 +420,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
 def _explain_implausible(
     mode: Mode, density: float, least_periods: float, span: float
 ) -> str | None:
-    """Return the reason why a good fit is no evidence of a single free vibration; None if it is."""
+    """Return the reason why a good fit does not show a single free vibration; None if it does."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         finding = f"the record shows {periods:.3g} vibration periods"
@@ -431,7 +432,7 @@ def _explain_implausible(
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
-        # 10 % finer than the limit, so that rounding to two digits is safe
+        # 10 % finer than the limit, so that the value remains sufficient when rounded to two digits.
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
         finding = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{finding}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"

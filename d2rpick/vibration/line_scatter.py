@@ -1,4 +1,4 @@
-"""Propagate the scatter of a record to the residuals that the lines of its energy give.
+"""Compute how uncertain residuals are that follow from spectral lines fitted to a scattered record.
 
 The lines are the least-squares fit of a sum of decaying waves, so the scatter of the record about them gives the
 covariance of their weights and poles, and the gradient of R^2 by these gives the standard deviation of R^2.
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lines import Exponentials, Grid
     from d2rpick.vibration.midpoint import Reading
 
-# Neighbouring states of the rest hardly share more than this: more would leave no state to average over [-].
+# Upper limit of the correlation of neighbouring misfits [-]. Beyond it no independent states would remain.
 _MOST_SHARED: Final = 0.9
-# Scatter of a rate before anything is fitted, in turns over the record; that of a decay is 1 over the record more than
-# the decay itself, and that of a weight is the weight itself.  Without such bounds noise of a line that the fit made of
-# noise would have no limit.
+# Assumed standard deviation of a rate before the fit, in cycles over the record. For a decay it is the decay itself
+# plus 1 over the record, for a weight the weight itself. Without such bounds the scatter of a line that the fit made
+# from noise would be unlimited.
 _LOOSE_TURNS: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Scatter of R^2 by a ``reading`` of lines that were fitted to a ``grid``.
+    """Standard deviation of R^2 for one interpretation (``reading``) of the lines that were fitted to a ``grid``.
 
-    Neighbouring states of the rest share the part ``systematic`` of it [-].
+    Neighbouring states have the share ``systematic`` of the misfit in common [-].
     """
 
     reading: Reading
@@ -48,7 +48,7 @@ class LineScatter:
 
     @cached_property
     def _spread(self) -> Samples:
-        """Return a root of the covariance of the parameters, of shape (p, p)."""
+        """Return a square root of the covariance matrix of the parameters, shape (p, p)."""
         spectrum = self.reading.spectrum
         waves = self._scale_by_gain(spectrum.lines)
         mean = self._scale_by_gain(spectrum.mean)
@@ -56,19 +56,19 @@ class LineScatter:
         design = np.hstack([_differentiate_waves(waves, times), mean.waves(times).real])
         freedom = max(times.size - design.shape[1], 1)
         shared = min(self.systematic, _MOST_SHARED)
-        # as many independent states as a first-order autoregression has
+        # The number of independent states follows from a first-order autoregression.
         variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)
         if variance <= 0:
             return np.zeros((design.shape[1], 1))
         loose = self._list_loose_scatters()
         scaled = design * loose / np.sqrt(variance)
-        # what is fitted and what was known before add up as the inverses of their variances
+        # The inverse variances of the fit and of the prior assumption are added.
         information, directions = np.linalg.eigh(scaled.T @ scaled)
         roots = directions / np.sqrt(1 + np.maximum(information, 0.0))
         return np.asarray(roots * loose[:, np.newaxis])
 
     def _list_loose_scatters(self) -> Samples:
-        """Return the standard deviation of each parameter before anything is fitted, shape (p,)."""
+        """Return the assumed standard deviation of each parameter before the fit, shape (p,)."""
         spectrum = self.reading.spectrum
         lines = spectrum.lines
         sizes = np.maximum(np.abs(lines.weights), self.reading.tiny)
@@ -78,11 +78,11 @@ class LineScatter:
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
     def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
-        """Return the waves as their means over the blocks of the grid."""
+        """Return the waves with weights that give their means over the blocks of the grid."""
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of R^2 by the parameters, shape (n, p) [1/energy, time/1].
+        """Return the derivatives of R^2 with respect to the parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
         """
@@ -116,7 +116,7 @@ class LineScatter:
 def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
     """Return the derivatives of the waves at times (n,), shape (n, 4 k).
 
-    They are by the real and imaginary parts of the weights, then by those of the poles.
+    The derivatives are with respect to the real and imaginary parts of the weights, then of the poles.
     """
     courses = waves.waves(times)
     moved = courses * waves.weights * (times - waves.origin)[:, np.newaxis]

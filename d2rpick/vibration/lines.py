@@ -24,32 +24,35 @@ if TYPE_CHECKING:
 
     Complex = NDArray[np.complex128]
 
-# Tried numbers of exponentials: each line needs two, the mean needs one or more.
+# Numbers of exponentials to try. Each line needs two, the mean needs one or more.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# A higher order must reduce the prediction error by this factor; below the second value no higher order is tried.
+# First: a higher order must reduce the prediction error to less than this share of it.
+# Second: below this relative prediction error no higher order is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], at most half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
-# States of the even grid in a period of the fastest relevant line, and the fewest and most states in all.
+# First: states of the even grid per period of the fastest relevant line.
+# Second and third: smallest and largest number of states of the grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
-# Times are even if they deviate by less than this share of a step, as single precision and printed digits do.
+# Times are treated as evenly spaced if they deviate by less than this share of a step, as rounded times do.
 _EVEN: Final = 1e-3
-# The power of white noise hardly exceeds this many times its median.
+# A line exceeds white noise if its power is more than this many times the median power.
 _ABOVE_NOISE: Final = 20.0
-# Shares of the power of an energy about its trend: rates up to the first share are relevant, up to the second strong.
-# A line of 1 % of the strongest one's height has 1e-4 of its power, and beyond the grid it would pass for a slower one.
+# The slowest lines with the first share of the power (without the trend) are relevant, with the second share strong.
+# A line of 1 % of the largest height has 1e-4 of the power; if the grid were too coarse, it would be aliased.
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# A line that has decayed within a part of the record is sought in the first part of this length [share of the record].
+# A line that decays early is searched for in this first share of the record.
 _EARLY: Final = 0.25
-# A line swings at least once in the record, and decays by less than this share of its rate and by fewer powers of e
-# within the record than the third value.
+# First: fewest cycles of a line in the record. Second: largest damping of a line, as a share of its rate.
+# Third: largest exponent by which a line decays within the record.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
-# A free vibration does not grow; noise hides a growth of this exponent over the record.
+# A free vibration does not grow, but noise may make it seem to grow by up to this exponent over the record.
 _MOST_GROWTH: Final = 0.2
-# The mean is a constant plus at most this many decays, whose exponents over the record differ by the second value.
+# The mean is a constant plus at most the first number of decays.
+# The exponents of two decays over the record differ by at least the second value.
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -81,9 +84,9 @@ class Grid(NamedTuple):
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
     def waves(self, poles: Complex) -> Complex:
-        """Return exp(p (t - t_0)) at the m times of the grid, t_0 the first, shape (m, poles) [-].
+        """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
 
-        On an even grid each is a product of two of about sqrt(m) exponentials, which are dearer than products.
+        On an even grid each value is a product of two from about 2 sqrt(m) exponentials, which is faster to compute.
         """
         count = self.time.size
         width = ceil(sqrt(count))
@@ -95,7 +98,7 @@ class Grid(NamedTuple):
         return products.reshape(-1, poles.size)[:count]
 
     def gain(self, poles: Complex) -> Complex:
-        """Return the mean of ``exp(p t)`` over a block relative to its middle value, of the shape of ``poles``."""
+        """Return the mean of ``exp(p t)`` over a block relative to its middle value, with the shape of ``poles``."""
         half = poles * self.spacing / 2
         with np.errstate(invalid="ignore", divide="ignore"):
             gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
@@ -103,7 +106,7 @@ class Grid(NamedTuple):
 
 
 def make_even_grid(time: Samples, energy: Samples) -> Grid:
-    """Bring an energy to an even grid that keeps all relevant lines.
+    """Resample an energy on an even grid that resolves all relevant lines.
 
     Parameters
     ----------
@@ -115,7 +118,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
     if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
         from scipy.interpolate import (
             CubicSpline,
-        )  # imported here: scipy makes the start slower
+        )  # Imported here to keep start-up fast.
 
         values = CubicSpline(time, energy)(even)
     fastest, strongest = _count_turns(even, values)
@@ -144,7 +147,7 @@ def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # white noise has as much power at the highest rates as anywhere
+    # White noise has the same power at all rates, so the highest rates show its level.
     noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(
@@ -167,11 +170,11 @@ class Exponentials(NamedTuple):
     origin: float
 
     def at(self, t: Samples | float) -> Samples:
-        """Return the value at each time, of the shape of ``t`` [energy]."""
+        """Return the value at each time, with the shape of ``t`` [energy]."""
         return np.asarray((self.waves(t) @ self.weights).real)
 
     def waves(self, t: Samples | float) -> Complex:
-        """Return each wave without its weight, of the shape of ``t`` with an axis for waves after it [-]."""
+        """Return each wave without its weight, with the shape of ``t`` and a last axis for waves [-]."""
         return np.exp(
             np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles)
         )
@@ -207,12 +210,12 @@ class Spectrum(NamedTuple):
         )
 
     def at(self, t: Samples | float) -> Samples:
-        """Return the energy at each time, of the shape of ``t`` [energy]."""
+        """Return the energy at each time, with the shape of ``t`` [energy]."""
         return self.lines.at(t) + self.mean.at(t)
 
 
 class Prediction(NamedTuple):
-    """The ``spectrum`` of a grid, that of its first part, and the error of the prediction from the first part.
+    """The ``spectrum`` of a grid, the spectrum of its first part, and the error of the prediction from the first part.
 
     ``missed`` is the root mean square deviation from the first part's spectrum, over the whole grid, relative to
     ``swing`` [-]; ``swing`` is the standard deviation of the energy about its trend [energy].
@@ -230,7 +233,7 @@ class Prediction(NamedTuple):
 
 
 def predict(grid: Grid) -> Prediction | None:
-    """Find as many lines of an energy as predict it best; None if it is too short or does not oscillate."""
+    """Find the number of lines that best predicts an energy; None if the record is too short or does not oscillate."""
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None
@@ -306,7 +309,7 @@ def fit_spectrum(
 ) -> Spectrum:
     """Fit lines and mean with the given poles to a grid; poles must differ within ``span`` [time].
 
-    ``every_decay``: the mean has that of each line as it is, which noise allows of few lines alone.
+    If ``every_decay`` is True, the mean contains the decay of each line, which noise permits only for few lines.
     """
     lines, mean = _split(poles, span, every_decay=every_decay)
     all_poles = np.concatenate([lines, mean])
@@ -355,7 +358,7 @@ def _split(
 
 
 def _few_of(decays: Samples, span: float) -> Samples:
-    """Replace many decays by a few that can be distinguished in the record."""
+    """Replace many decays with a few that can be distinguished in the record."""
     rounded = sorted(set(np.round(decays * span, 1).tolist()))
     few = np.array([decay for decay in rounded if abs(decay) > _SAME_DECAY])
     if few.size > _MOST_DECAYS:

@@ -1,4 +1,4 @@
-"""Find lines of an energy that are locked to others: lines of a static stretch, and harmonics of nonlinear springs."""
+"""Find lines whose rate and phase are locked to other lines: those of a static stretch and of nonlinear springs."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
-# Smallest relevant line relative to the strongest line, the same relative to a partner line, and in units of scatter.
+# Smallest height of a relevant line, relative to the strongest line (first), relative to the line to which it is
+# locked (second), and in standard deviations (third).
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are equal if they differ by less than this share of a turn over the record.
-# They are exactly equal if they differ by less than this angle [rad], beside what scatter may add.
+# First: two rates are treated as equal if they differ by less than this share of a cycle over the record.
+# Second: they are exactly equal if they differ by less than this angle [rad], plus what scatter may add.
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
 # is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
 _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
-# Multiples of its rate at which a stretch that swings has energy: a pendulum's pull has a few harmonics.
+# A stretch that oscillates has energy at these multiples of its rate, as the force in a pendulum has harmonics.
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
-# Logarithm of the ratio of two heights that count as one.
+# Two heights are treated as equal if the logarithm of their ratio is below this.
 _SAME_HEIGHT: Final = 0.1
-# Number of strongest lines whose harmonics are searched, and their orders.
+# Harmonics are searched for at this many of the strongest lines (first), in these orders (second).
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
@@ -76,7 +77,7 @@ def find_stretches(
                 abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
                 < _SAME_PHASE + unsure
             ):
-                # a fit knows a rate over the record sqrt(12) times worse than a phase
+                # In a fit, the error of a rate times the record length is sqrt(12) times the error of a phase.
                 is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
                 energy = float(size[line] ** 2 / (8 * size[own_line]))
                 stretches.append(StretchLine(line, own_line, energy, is_exact=is_exact))
@@ -142,7 +143,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def may_be_of_spring(self) -> bool:
-        """Return True if the line is as high as that of a stiffening spring, as far as the record can show."""
+        """Return True if the line may be as high as the third harmonic of a stiffening spring, within the scatter."""
         if self.second > _HIGHEST_SECOND:
             return False
         room = _THIRD_ROOM * self.expected + ABOVE_SCATTER * self.scatter
@@ -150,7 +151,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def is_of_spring(self) -> bool:
-        """Return True if the line is that of a stiffening spring, and too high for none."""
+        """Return True if the line is as high as for a stiffening spring, and too high to be scatter."""
         is_seen = self.expected > 2 * ABOVE_SCATTER * self.scatter
         return self.may_be_of_spring and is_seen
 
@@ -158,7 +159,7 @@ class ThirdHarmonic(NamedTuple):
 def measure_third_harmonic(
     stretch: StretchLine, spectrum: Spectrum, time: Samples, scatter: float
 ) -> ThirdHarmonic:
-    """Measure the third harmonic of a line whose second harmonic is the line of a mode, if it is not one of a spring.
+    """Measure the third harmonic of a line whose second harmonic is either a mode or due to a nonlinear spring.
 
     Parameters
     ----------
@@ -231,7 +232,7 @@ def _measure_locked_to(
         if times > 2:
             if (
                 size[line] > size[first]
-            ):  # a harmonic is never stronger than its line, so these lines are modes
+            ):  # A harmonic is never stronger than its fundamental line, so these lines are modes.
                 return 0.0
             total += float(size[line] / size[first])
     return total

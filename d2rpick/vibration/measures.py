@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
-    # Measures of n times by name, arrays of shape (n,); NaN if unknown.
+    # Measures of n times: arrays of shape (n,) by name, NaN for unknown values.
     Columns = Mapping[str, Samples]
     # Function that returns the residual of each tr with its lower and upper bound [-].
     # Its arguments are the residual of the deformations, tr, and td.
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Increase of the frozen-deformation error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
-# Factor of the damping ratio for the part of R^2 that depends on the phases at td; it is 2 at most.
+# The part of R^2 that depends on the phases at td is this factor times the damping ratio; theory allows up to 2.
 _PHASES_COUNT = 1.5
 
 
@@ -41,10 +41,10 @@ class Deformation(Protocol):
     """Interface of a vibration model: products of deformations at different times, and energies."""
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return the elastic energy of the deformation, of the shape of ``t`` [energy]."""
+        """Return the elastic energy of the deformation, with the shape of ``t`` [energy]."""
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the product of the deformations at tr and td, of the shape of ``tr`` [energy]."""
+        """Return the product of the deformations at tr and td, with the shape of ``tr`` [energy]."""
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Return the elastic energy of the difference of the deformations at tr and td [energy]."""
@@ -57,7 +57,7 @@ class Deformation(Protocol):
 
 
 class Measured(Record):
-    """Measures of one tr that need known deformations; each is None if it is unknown.
+    """Measures of one tr that require known deformations; each is None if it is unknown.
 
     ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
     """
@@ -80,7 +80,7 @@ def measured(
     *,
     of_parts: bool,
 ) -> Columns:
-    """Return a column for each field of `Measured`, for each tr (n,) and one ``td``, or one for each tr.
+    """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr.
 
     If ``of_parts`` is True the deformations are those of parts, and the mismatch is relative to their energy at td.
     """
@@ -102,7 +102,7 @@ def measured(
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Put columns of `Measured` into ``size`` rows at the given rows, with NaN in the others."""
+    """Place columns of `Measured` at the given rows of a table with ``size`` rows; the other rows are NaN."""
     nothing = np.broadcast_to(np.nan, size)  # a broadcast array needs no memory
     spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
     for rows, columns in found:
@@ -112,7 +112,7 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 
 
 def compared(columns: Columns) -> NDArray[np.bool_]:
-    """Return an array that is True if the deformation at a time can be compared with that at td."""
+    """Return for each time whether its deformation can be compared with the deformation at td."""
     return ~np.isnan(columns["sign_match"])
 
 
@@ -130,7 +130,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # compared with a level of almost zero, any other energy is infinitely wrong
+    ):  # Relative to a level of almost zero, the error of any other energy may overflow to infinity.
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )
@@ -180,7 +180,7 @@ def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Sample
 def sign_match(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> NDArray[np.bool_]:
-    """Return an array that is True if the deformations at tr and td have the same direction.
+    """Return for each tr whether the deformations at tr and td have the same direction.
 
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part with
     almost no deformation does not decide.
@@ -259,7 +259,7 @@ def run_time_share(
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return how far each tr (n,) may be off in both directions before L grows by 0.05 [time]; td as for L.
+    """Return by how much each tr (n,) may be wrong in either direction before L grows by 0.05 [time]; td as for L.
 
     That is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr by the
     tolerated growth; one period if q stays inside, since q has then passed all its values.
@@ -270,7 +270,7 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     )
     half = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # times without velocity on both sides of tr, in columns: q is monotone between them
+    # Times of zero velocity on both sides of tr, in columns. Between them q is monotone.
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
@@ -278,17 +278,17 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
 
 
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
-    """Return the distance from the first of the ``edges`` to where |q - wanted| exceeds ``room``, else infinity.
+    """Return the time from the first of the ``edges`` until |q - wanted| exceeds ``room``; infinity if it does not.
 
     Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself is inside, regardless of rounding
+    outside[0] = False  # tr itself is inside, whatever rounding says
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # beyond the band, on the side where q leaves it
+    # This value lies outside of the band, on the side where q leaves it.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
@@ -313,7 +313,7 @@ def vertices(
     rise = (values[at + 1] - values[at]) / step_after
     bend = (rise - fall) / (step_before + step_after)
     slope = (fall * step_after + rise * step_before) / (step_before + step_after)
-    # next to an unbounded value a sample is its own vertex, as on a straight line
+    # A sample next to an infinite value, or on a straight line, is its own vertex.
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
     return time[at] + step, values[at] + np.multiply(
@@ -332,7 +332,7 @@ class Profile(NamedTuple):
         """Compute the profile at the times before ``td``."""
         time_before = time[
             : np.searchsorted(time, td)
-        ]  # views: a copy for each td would fill the memory
+        ]  # These are views, since a copy for each td would fill the memory.
         return cls(time_before, lock_in_error(vibration, time_before, td))
 
     def minima(self) -> tuple[float, ...]:
@@ -355,7 +355,7 @@ class Profile(NamedTuple):
         return np.asarray(self.time[next_state] - self.time[next_state - 1])
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """Return how far each tr (n,) may be off before L grows by 0.05, at most the length of the profile [time].
+        """Return by how much each tr (n,) may be wrong before L grows by 0.05, at most the profile's length [time].
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
@@ -386,5 +386,5 @@ class Profile(NamedTuple):
             (self.time[at], self.error[at]) for at in (inside, outside)
         )
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # if no sample lies between tr and the first sample outside, that sample is used
+        # If there is no sample between tr and the first sample outside, that sample is used.
         return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

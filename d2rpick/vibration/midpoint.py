@@ -1,4 +1,4 @@
-r"""Compute the error of any pair of times from the energy alone, for any number of modes, by its value halfway between.
+r"""Compute the error of any pair of times, for any number of modes, from the energy at tr, td and halfway between them.
 
 A linear structure in free flight has modes :math:`q_k = a_k e^{-g_k t} \cos(w_k t + p_k)`, scaled so that the elastic
 energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr and td and :math:`\tau` from tr to td,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """An interpretation of a spectrum that decides which lines are modes.
+    """An interpretation of a spectrum, which defines which lines are modes.
 
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
@@ -60,7 +60,7 @@ class Reading:
         return 2 * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, the elastic energy of the vibration, of the shape of ``t``; noise may make it negative [energy]."""
+        """Return V, the elastic energy of the vibration, in the shape of ``t``; noise may make it negative [energy]."""
         t = np.asarray(t, dtype=np.float64)
         energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
         if self.no_static:
@@ -72,7 +72,7 @@ class Reading:
         return np.asarray(energy + self.level_of_modes(t) / 2)
 
     def level_of_modes(self, t: Samples | float) -> Samples:
-        """Return the sum of the mode energies according to their lines, of the shape of ``t`` [energy]."""
+        """Return the sum of the mode energies according to their lines, with the shape of ``t`` [energy]."""
         decays = self.modes._replace(
             poles=self.modes.poles.real.astype(np.complex128),
             weights=self._peak_energies.astype(np.complex128),
@@ -80,7 +80,7 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """Return H, the energy of all modes averaged over a period, of the shape of ``t`` [energy]."""
+        """Return H, the energy of all modes averaged over a period, with the shape of ``t`` [energy]."""
         if self.no_static:
             level = 2 * self.spectrum.mean.at(t)
         else:
@@ -88,7 +88,7 @@ class Reading:
         return np.maximum(level, self.tiny)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, the elastic and kinetic energy of the vibration, of the shape of ``t`` [energy]."""
+        """Return U = V + T, the elastic and kinetic energy of the vibration, with the shape of ``t`` [energy]."""
         return np.maximum(self.level(t) + self._within_period.at(t), self.tiny)
 
     @cached_property
@@ -101,7 +101,7 @@ class Reading:
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 
     def energies_of_modes(self, t: float) -> Samples:
-        """Return the vibration energy of each mode at a time, shape (k,), not negative [energy]."""
+        """Return the vibration energy of each mode at a time, not negative, shape (k,) [energy]."""
         decayed = self._peak_energies * np.abs(self.modes.waves(t))
         within_period = self._within_period
         return np.maximum(
@@ -115,12 +115,12 @@ class Reading:
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """Return the factor of tr in the coherence, with an axis for modes after the shape of tr [energy]."""
+        """Return the factor of the coherence that depends on tr, with a last axis for modes [energy]."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """Return the factor of td in the coherence, with an axis for modes after the shape of td [-]."""
+        """Return the factor of the coherence that depends on td, with a last axis for modes [-]."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:

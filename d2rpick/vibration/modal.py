@@ -1,4 +1,4 @@
-"""Identify a vibration with any number of modes from the spectral lines of the energy, with all doubts.
+"""Identify a vibration with any number of modes from the spectral lines of the energy, and list all doubts about it.
 
 Lines can be interpreted in more than one way: how much of the mean is static, and which lines belong to a stretch
 rather than a mode.  The best interpretation is used; other ones, and the lines of the record's first part, widen the
@@ -38,21 +38,21 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Fewest states of a record for a search of lines.
+# Lines are searched for only in records with at least this many states.
 _FEWEST_STATES: Final = 32
-# A static energy below this share of the mean vibration energy is due to the scatter of the fit.
+# A static energy below this share of the mean vibration energy may be a fitting error.
 _NO_STATIC: Final = 0.12
-# There is no vibration if the relative range of the energy is smaller: single precision resolves no less.
+# There is no vibration if the relative range of the energy is smaller, since single precision cannot resolve it.
 _RESOLVED: Final = 2e-7
 # Smallest divisor, as a share of the range of the record.
 _TINY: Final = 1e-12
-# Number of values of tr, and of td, for which the overlap is compared with its bounds.
+# The overlap is compared with its bounds for this many values of tr, and for as many of td.
 _CHECKED: Final = 90
 
 # A line may be a stretch or a mode of half the rate if the static energies differ by less than this share of the mean.
 _AMBIGUOUS: Final = 0.08
 
-# Limits above which a record is refused.
+# Limits beyond which a record is refused, beginning with the prediction error.
 _MOST_MISSED: Final = 0.5  # prediction error relative to the range of the energy
 _MOST_MISFIT: Final = 0.3  # misfit relative to the range of the energy
 _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
@@ -67,32 +67,31 @@ _MOST_HARMONIC: Final = 0.05  # size of harmonics relative to their fundamental 
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
     0.15,
     0.6,
-)  # energy of a stretch that is missing in the static energy
+)  # energy of a stretch that the static energy does not contain
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
 # Times per period of the fastest relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Refinement of these times between which the energy is linear.
+# Between these times, each interval is divided into this many parts in which the energy is treated as linear.
 _FINER: Final = 4
 
-# Largest misfit of modes that show a flight, as a share of the energy range.
-# The second value limits the prediction error of such modes.
+# Largest misfit (first) and prediction error (second) of modes that show a flight, relative to the energy range.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # Half-width of the band of R^2 before it is widened for known errors, and how far a solver's structure is from a linear
 # one, relative to its deformation [-]: R of pairs of a shell box is off by 0.015 to 0.018 rms against all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 _VAGUE_HALF: Final = (
-    0.2  # half-width of R^2 of vague modes; well-identified modes have 0.02 to 0.1
+    0.2  # half-width of R^2 for poorly identified modes; otherwise it is 0.02 to 0.1
 )
-_SOME_TIMES: Final = 64  # at which the band is looked at as a whole
-# Standard deviations of R^2 that its band has to each side, as for one oscillator.
+_SOME_TIMES: Final = 64  # number of times at which the band is evaluated
+# Half-width of the band of R^2 in standard deviations, as for a single oscillator.
 _DEVIATIONS: Final = 2.5
 # What remains of the record beside its lines changes R^2 by this many times its share of the energy: V enters it at tr
 # and, twice, halfway, and 1.6 is the ratio of the 90 % quantile of a normal distribution to its deviation.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
-# A correlation of neighbouring states below this many standard errors is one of noise.
+# A correlation of neighbouring states below this many standard errors is treated as noise.
 _CHANCE: Final = 2.0
 # Effects on R^2: of a mean energy that changes in the flight, where the first part predicts the rest as badly as
 # `_LITTLE_MISSED`; and of a negative static energy, or one too small for its stretch.
@@ -100,9 +99,9 @@ _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # Effect of the second harmonic of a stiffening spring on R^2, where both deformations are alike, and where they are
 # farthest from being alike or opposite.  A spring whose amplitude falls also changes its rate.
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
-# Difference of a swinging stretch at two times, squared, over its mean square: 2 on average, 8 at most.
+# Squared difference of an oscillating stretch at two times over its mean square; it is 2 on average, 8 at most.
 _SWINGING_COUNTS: Final = 4.0
-_HIDDEN_LINES: Final = 12  # number of lines that may hide in the rest of the fit
+_HIDDEN_LINES: Final = 12  # assumed number of lines hidden in the misfit
 
 
 class Doubts(NamedTuple):
@@ -124,16 +123,16 @@ class Doubts(NamedTuple):
 
     @property
     def refusal(self) -> str | None:
-        """Return the reason for refusing the record; None if there is none."""
+        """Return the reason why the record is refused; None if it is accepted."""
         return self._first_of(_MOST_NEGATIVE, _MOST_UNSTRETCHED)
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason for refusing the record if no better model exists; None if there is none."""
+        """Return the reason why the record is refused even if no better model exists; None if it is accepted then."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason for a refusal under the given limits."""
+        """Return the first reason why the record is refused under the given limits."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,
@@ -174,7 +173,7 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies at times so close that linear interpolation is exact enough [time], [energy]."""
+    """Elastic energies at times so close that linear interpolation is accurate enough [time], [energy]."""
 
     time: Samples
     energy: Samples
@@ -246,7 +245,7 @@ class ModalVibration:
 
     @property
     def convinces(self) -> bool:
-        """Return True if the modes predict the record so well that no other load can act on it."""
+        """Return True if the modes predict the record so well that no load can act in it."""
         white = 1 - self.systematic
         structure = self.doubts.misfit * np.sqrt(self.systematic)
         missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
@@ -254,7 +253,7 @@ class ModalVibration:
 
     @property
     def told(self) -> str:
-        """Return a description of what a choice is based on: the modes with their rates."""
+        """Describe what a choice is based on: the modes with their rates."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         if rates.size == 1:
@@ -283,19 +282,19 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, of the shape of ``t``, not negative [energy]."""
+        """Return V, not negative, with the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, of the shape of ``t`` [energy]."""
+        """Return U = V + T, with the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, of the shape of ``t``, not negative [energy]."""
+        """Return T, not negative, with the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, the product of the deformations at tr and td, for arrays of one shape, or one number [energy]."""
+        """Return X, the product of the deformations at tr and td, for numbers or arrays of the same shape [energy]."""
         return self.reading.overlap(tr, td)
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -346,7 +345,7 @@ class ModalVibration:
             / level
         )
         deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
-        # both show how well the lines are known: by their scatter, and by a part of the record
+        # Both show how accurate the lines are: the scatter of the fit, and the fit to the first part of the record.
         of_lines = np.maximum(deviation, lines)
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         width_of_neglected = np.zeros_like(squared)
@@ -371,13 +370,13 @@ class ModalVibration:
 
     @property
     def _structure_of_rest(self) -> float:
-        """Return the share of the rest that neighbouring states have in common beyond chance [-]."""
+        """Return the share of the misfit that neighbouring states have in common, beyond what chance explains [-]."""
         chance = _CHANCE / np.sqrt(self.reading.spectrum.rest.size)
         return max(self.systematic - float(chance), 0.0)
 
     @cached_property
     def is_vague(self) -> bool:
-        """Return True if the band of most pairs is so wide that it hardly distinguishes them."""
+        """Return True if the error bands of most pairs are so wide that they hardly distinguish the pairs."""
         some_times = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
         widths = [
             self.half_width(some_times, td) for td in some_times[:: _SOME_TIMES // 8]
@@ -394,7 +393,7 @@ class ModalVibration:
         return measures.band_about(np.square(stated), self.half_width(tr, td), 0.0, 0.0)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the share of the vibration energy at td that corresponds to the band, for each tr [-].
+        """Return the share of the vibration energy at td that a hidden mode needs to explain the band, for each tr [-].
 
         A hidden mode in opposite phase at tr and td adds four times its share to R^2.
         """
@@ -414,7 +413,7 @@ class ModalVibration:
         """Return the error that widens the band of all pairs equally [-]."""
         doubts = self.doubts
         if self.reading.no_static:
-            return doubts.harmonic  # the other reading shows what the mean is worth
+            return doubts.harmonic  # The alternative interpretation already accounts for the error of the mean.
         badly_predicted = min(doubts.missed / _LITTLE_MISSED, 1.0)
         return (
             _DRIFT_COUNTS * doubts.drift * badly_predicted
@@ -425,7 +424,7 @@ class ModalVibration:
     def _of_other_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> Samples:
-        """Return the error of R^2 because the lines have other interpretations [-]."""
+        """Return the error of R^2 that results if another interpretation of the lines is correct [-]."""
         apart = [
             np.abs(reading.residual_squared(tr, td) - squared)
             for reading in self.others
@@ -434,7 +433,7 @@ class ModalVibration:
             if apart:
                 return np.asarray(np.max(apart, axis=0))
             return np.zeros(squared.shape)
-        # lines hidden in the misfit have at most this energy in addition to the identified lines
+        # Upper limit of the energy of lines hidden in the misfit, in addition to the identified lines.
         hidden = (
             _find_most_hidden(self.reading.spectrum.rest)
             / self.reading.level(td)
@@ -461,12 +460,12 @@ def identify_modal(
     time, energy : array of shape (n,)
         [time], [energy], of the whole structure that vibrates together.
     kinetic : bool
-        Whether it is the kinetic energy, and not the internal one.
+        True if ``energy`` is the kinetic energy rather than the internal energy.
 
     Returns
     -------
     ModalVibration or None
-        Its ``doubts`` say whether it can be relied on.
+        Its ``doubts`` show whether it is reliable.
 
     Examples
     --------
@@ -498,7 +497,7 @@ def identify_modal(
 def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Return the result of the internal energy, its band widened towards that of the kinetic one, else the latter."""
+    """Return the result of the internal energy, with a wider band, or else the result of the kinetic energy."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
@@ -509,7 +508,7 @@ def confirm_by_kinetic_energy(
 
 
 def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
-    """Return True if kinetic energy may decide, as plastic flow or a damper makes the internal energy useless.
+    """Return True if the kinetic energy may be used, since plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
     """
@@ -527,7 +526,7 @@ def _read(
     *,
     kinetic: bool = False,
 ) -> ModalVibration:
-    """Interpret the lines in the best way and in other ways; the mean of a ``kinetic`` energy has no meaning.
+    """Return the best interpretation of the lines with its alternatives; the mean of a ``kinetic`` energy is ignored.
 
     ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
     """
@@ -633,7 +632,7 @@ def _read(
 
 
 def _find_most_hidden(rest: Samples) -> float:
-    """Return the most vibration energy that lines hidden in the rest (n,) of a fit may have [energy].
+    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
 
     None of them is higher than the highest line of the rest, and together they are no more than the rest.
     """
@@ -643,7 +642,7 @@ def _find_most_hidden(rest: Samples) -> float:
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
-    """Return how far R^2 may be off if the difference of two deformations is off by a share ``off`` of them [-]."""
+    """Return the error of R^2 if the difference of two deformations has an error of a share ``off`` of them [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 
@@ -653,7 +652,7 @@ def _compute_sine(squared: Samples) -> Samples:
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
-    """Count the states per period of the fastest relevant line that is not scatter."""
+    """Count the states per period of the fastest relevant line that is stronger than noise."""
     sizes = np.abs(lines.weights)
     least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
     fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
@@ -668,7 +667,7 @@ def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
-    """Return times in a window so close that a parabola through three of them finds a minimum [time]."""
+    """Return times in a window, so close that a parabola through three of them locates a minimum [time]."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
@@ -678,7 +677,7 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
 
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """Return how far the overlap exceeds its bounds, relative to the vibration energy: rms over pairs of times [-]."""
+    """Return by how much the overlap exceeds its bounds, over the vibration energy (rms over pairs of times) [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T

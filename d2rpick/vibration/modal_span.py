@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 
 # Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
-# Shares of the record at which windows that reach its end begin.
+# Windows that reach the end of the record begin at these shares of it.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate little:
-# by less than this share of the vibration energy, or this many times the scatter of such means.
+# Outside its window the record follows the modes as long as means over a fraction of the fastest period deviate little.
+# First: number of means per period. Second: largest deviation as a share of the vibration energy.
+# Third: largest deviation in standard deviations of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
-# Most repetitions of extending and identifying a window.
+# Largest number of times that a window is extended and identified again.
 _MOST_REFITS: Final = 3
 
 
@@ -57,7 +58,7 @@ def find_described(
 
 @remember
 def _grow_described(history: History, window: Span) -> ModalWindow | None:
-    """Grow a window whose modes go on by themselves; None if they do not.
+    """Extend a window whose modes continue undisturbed outside of it; None if they do not.
 
     The result depends on the window alone, not on the td that was asked for first.
     """
@@ -68,7 +69,7 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
-    """Return the complete sixteenths of the record in a guessed window, so that many td share few windows."""
+    """Return the part of a guessed window made of complete 1/16 of the record, so that many td share few windows."""
     first = float(history.time[0])
     last = float(history.time[-1])
     part = (last - first) / _PARTS
@@ -115,7 +116,7 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
 
 
 def identify_window(history: History, window: Span) -> ModalVibration | None:
-    """Identify the modes of the states in a window, once for all windows that hold the same states."""
+    """Identify the modes in a window; the result is cached for all windows with the same states."""
     time, _ = history.between(*window)
     return _identify_states(history, *get_ends(time)) if time.size else None
 
@@ -124,12 +125,12 @@ def identify_window(history: History, window: Span) -> ModalVibration | None:
 def _identify_states(
     history: History, first: float, last: float
 ) -> ModalVibration | None:
-    """Identify the modes of the states from one to another, by their times."""
+    """Identify the modes of the states between two times."""
     return identify_modal(*history.between(first, last))
 
 
 def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
-    """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
+    """Extend a window as far as the record follows its modes and identify these again, until it no longer changes."""
     for _ in range(_MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
@@ -142,7 +143,7 @@ def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
 
 
 def _find_reach(history: History, found: ModalWindow) -> Span:
-    """Return the window in which the record follows the modes, at least the one of their identification."""
+    """Return the window in which the record follows the modes; it contains the window of their identification."""
     time = history.time
     energy = history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
@@ -173,7 +174,7 @@ def _count_up_to_last_off(
         return int(time.size)
     with np.errstate(
         over="ignore", invalid="ignore"
-    ):  # far from the window, damped modes overflow
+    ):  # Far from the window, damped modes overflow.
         deviation = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(

@@ -1,4 +1,4 @@
-"""Decide which model of the vibration is reliable at one td, and what it shows there.
+"""Decide which model of the vibration is reliable at a td, and describe the vibration by it.
 
 The order is that of `MODELS`: the signs of parts before an oscillator that describes the record, this before the modes
 of the structure and counted swings unless it leaves much over, and these before the energy alone.  The result is a
@@ -46,14 +46,14 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
-# Reason why no tr can be trusted if the vibration at td is below the noise.
+# The reason given if the vibration at td is below the noise, so that no tr can be trusted.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 # Residual of a release without any vibration: a switch with a larger residual preserves nothing [-].
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the time before td saves little, and resembles td only because it is close.
+# A tr in this last share of the time before td saves little, and its deformation is similar only because it is near.
 NEAR_TD: Final = 0.25
-# Number of parts that a warning names for one reason; the JSON names all.
+# Largest number of parts that a warning names for one reason. The JSON output names all parts.
 _NAMED = 5
 
 
@@ -78,7 +78,7 @@ class Vibration:
     Parameters
     ----------
     basis : str
-        Name of the model, as in `MODELS`.
+        Name of the model, one of `MODELS`.
     whole : SampledEnergy
         The energy of all parts together.
     compared : Compared or None
@@ -86,13 +86,13 @@ class Vibration:
     undescribed : str
         Why a single tr has no measures although deformations are known.
     told : str
-        What a model that tells the sign has to say of itself.
+        Description of the model that gives the sign.
     estimated : str or None
         What the kinetic share is an estimate from, and why; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
     parts : SignedParts or None
-        What single parts tell, also where it is not relied on.
+        The signs of single parts, even if they are not used.
     """
 
     basis: str
@@ -124,12 +124,12 @@ class Vibration:
 
     @property
     def reasons(self) -> str | None:
-        """Return the reasons why no signed deformation is known, also of single parts; None if one is known."""
+        """Return the reasons why no signed deformation is known, also for single parts; None if one is known."""
         if self.compared or not self.parts:
             return self.unknown
         names: dict[
             str | None, list[str]
-        ] = {}  # grouped by reason, since all parts of a structure often share one
+        ] = {}  # grouped by reason, since the parts of a structure often have the same
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
         of_parts = (
@@ -147,7 +147,7 @@ class Vibration:
 
     @cached_property
     def profile(self) -> Profile | None:
-        """Return the frozen-deformation error before td, whose minima are the closest matches; None without one."""
+        """Return the frozen-deformation error before td, which has minima at the closest matches; None if unknown."""
         if self.compared is None or self.compared.profile is None:
             return None
         return self.compared.profile(self.td)
@@ -199,7 +199,7 @@ class Vibration:
         matches = self.profile.minima() if self.profile else ()
         if (
             self.basis == "modal"
-        ):  # the total energy level of many modes is no criterion
+        ):  # The level of the total energy is not a criterion for many modes.
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(
@@ -207,7 +207,7 @@ class Vibration:
         )
 
     def _least_deformed(self) -> tuple[float, ...]:
-        """Return the time of least elastic energy if no tr preserves the vibration; it preserves the static part."""
+        """Return the time of least elastic energy, which keeps the static part, if no tr preserves the vibration."""
         if not self.keeps_nothing or self.compared is None or self.profile is None:
             return ()
         times = self.profile.time
@@ -228,7 +228,7 @@ class Vibration:
         return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors limited by the tolerance, of the shape of ``times``; infinite if no tr is useful [-].
+        """Return the errors to which the tolerance applies, in the shape of ``times``; infinite if no tr is useful [-].
 
         The frozen-deformation error if signs are known (for a few modes only if they match), else the level error.
         """
@@ -252,7 +252,7 @@ class Vibration:
     def reach(self, moments: Moments) -> Samples:
         """Return the uncertainty of each moment [time]; for a match, half an interval of the profile."""
         reach = self.whole.reach(moments.tr)
-        # a match is at the least error
+        # A match lies at a minimum of the error.
         if self.profile:
             return np.where(
                 moments.are("match"), self.profile.cell(moments.tr) / 2, reach
@@ -265,18 +265,18 @@ class Vibration:
             return ()
         from d2rpick.vibration.part_signs import (
             list_contributions,
-        )  # imported here, because tables have no parts
+        )  # Imported here to keep start-up fast.
 
         return list_contributions(self.signed, tr, self.td)
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
-        """Return an array that is True if the deformation at a time can be compared with that at td."""
+        """Return for each time whether its deformation can be compared with the deformation at td."""
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
 
     def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
-        """Return columns of measures of comparable times (n,), for one ``td`` or for one td each (single mode)."""
+        """Return the measures of comparable times (n,) as columns, for one ``td`` or (one mode) a td for each."""
         assert self.compared
         deformation = self.compared.deformation
         if isinstance(deformation, Mode):
@@ -295,7 +295,7 @@ class Vibration:
 def find_moments(
     vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Return the candidate times of each vibration, as `Vibration.moments` does; those of one mode together.
+    """Return the candidate times of each vibration, as `Vibration.moments` does; vibrations of one mode share the work.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 
 
 class Evidence(NamedTuple):
-    """Models that were found in a record, regardless of their reliability at a td.
+    """The models that were found in a record, whether or not they are reliable at a td.
 
     ``fit`` is None only if no oscillator was searched; ``span`` is the window that it describes.  ``given`` is True for
     a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
@@ -390,7 +390,7 @@ class Evidence(NamedTuple):
 
     @property
     def parts(self) -> SignedParts | None:
-        """Return the deformations of single parts, also if too few have a sign."""
+        """Return the deformations of single parts, even if too few of them have a sign."""
         return cast("SignedParts | None", self.models.get("parts"))
 
     @property
@@ -400,31 +400,31 @@ class Evidence(NamedTuple):
 
     @property
     def refusal(self) -> str | None:
-        """Return the reason why modes could not be identified; None if they were, or were not searched."""
+        """Return the reason why modes could not be identified; None if they were, or were not searched for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
     def has_sure_modes(self) -> bool:
-        """Return True if modes tell the sign, and not only for want of anything better."""
+        """Return True if modes give the sign and are reliable, not merely the last resort."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal is not None and modal.doubts.refusal is None
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the states per period of the fastest line of the energy [-]; None if no lines were searched."""
+        """Return the states per period of the fastest line of the energy [-]; None if no lines were searched for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def states_per_strong_period(self) -> float | None:
-        """Return the states per period of the fastest strong line [-]; None if no lines were searched."""
+        """Return the states per period of the fastest strong line [-]; None if no lines were searched for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 
     @property
     def has_model(self) -> bool:
-        """Return True if more than the samples of the energy may be used at some td."""
+        """Return True if, at some td, a model may be used rather than only the samples of the energy."""
         fit = self.fit
         return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
 
@@ -458,7 +458,7 @@ def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
-    # Structure that neighbouring states share is a further mode, which the modes describe better.
+    # If neighbouring misfits are correlated there is a further mode, which the modal model describes better.
     # White noise can only hide a mode.
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
@@ -521,7 +521,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
-        # lines need fewer states than a level, and refuse a record that has fewer
+        # Lines can be fitted with fewer states than a level needs, and the fit refuses a record with too few.
         aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
@@ -548,7 +548,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
 def describe_energy_at(
     history: History, td: float, evidence: Evidence
 ) -> SampledEnergy:
-    """Return the best description of the energy, also if it is unreliable at ``td``: an oscillator, else samples."""
+    """Return the best description of the energy, even if it is unreliable at ``td``: an oscillator, else samples."""
     fit = evidence.fit
     span = evidence.span
     if fit and fit.mode and span:
@@ -557,7 +557,7 @@ def describe_energy_at(
 
 
 def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
-    """Return a doubt if the energy swings so fast that its states miss the level as they miss the vibration."""
+    """Return a doubt if the energy oscillates so fast that its states show neither the vibration nor the level."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)

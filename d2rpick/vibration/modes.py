@@ -23,9 +23,9 @@ BLOCK: Final = 8192
 # Most steps of the root search; bisection alone reaches rounding with them.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
-# Energies below this share of the highest one may be no vibration: solver errors are 1/10 of it at any time.
+# Energies below this share of the highest energy may be solver errors, which are typically 1/10 of this.
 SOLVER_FLOOR: Final = 1e-4
-# A deformation below this share of the amplitude is zero within rounding.
+# A deformation below this share of the amplitude is treated as zero.
 _ZERO = 1e-9
 
 
@@ -92,7 +92,7 @@ class Mode(SignedAmplitudes):
         return self._swing(t, *self._velocity_parts)
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return the signed deformation, of the shape of ``t`` with an axis of length one before it [sqrt(energy)]."""
+        """Return the signed deformation, with the shape of ``t`` and a first axis of length one [sqrt(energy)]."""
         return self.deformation(t)[np.newaxis]
 
     def energy(self, t: Samples | float) -> Samples:
@@ -125,7 +125,7 @@ class Mode(SignedAmplitudes):
         return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
 
     def energy_gradient(self, t: Samples, size: int) -> Samples:
-        """Return the derivatives of E(t) by the first ``size`` parameters of the class without origin, (size, n)."""
+        """Return the derivatives of E(t) with respect to the first ``size`` parameters without origin, (size, n)."""
         own_gradient = np.array(
             [
                 self.omega,
@@ -149,7 +149,7 @@ class Mode(SignedAmplitudes):
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) with q' = 0, in ascending order [time]."""
-        if not start < end:  # ``start`` may be a time without a finite phase
+        if not start < end:  # For some ``start`` the phase is not finite.
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(
@@ -167,7 +167,7 @@ class Mode(SignedAmplitudes):
         return tuple(times[q * (q - self.preload) > 0].tolist())
 
     def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) at which q equals ``level_q``, in ascending order and to rounding [time].
+        """Find the times in (start, end) at which q equals ``level_q``, ascending and accurate to rounding [time].
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
@@ -182,9 +182,9 @@ class Mode(SignedAmplitudes):
     def all_level_crossings(
         self, td: Samples, start: float
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find these crossings for every ``td`` (n,) at once; return the index of the td, and the time."""
+        """Find the level crossings for every ``td`` (n,) at once; return the index of the td and the time of each."""
         level = self.deformation(td)
-        # each zero passage crosses the level zero once, regardless of the sign of rounding
+        # Each zero of q crosses the level zero once, whatever the sign of the rounding error.
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
@@ -259,7 +259,7 @@ class Mode(SignedAmplitudes):
 def compute_energy_and_jacobian(
     parameters: Samples, s: Samples, size: int
 ) -> tuple[Samples, Samples]:
-    """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n).
+    """Return E(s), shape (n,), and its derivatives with respect to the first ``size`` parameters, shape (size, n).
 
     The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
     """

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# If the scatter of the last period exceeds this share of the vibration energy at td, the sign is uncertain.
+# The sign is uncertain if the scatter of the last period exceeds this share of the vibration energy at td.
 _DROWNED = 0.2
-# Times closer than this share of a radian are equal within rounding.
+# Times that differ by less than this phase [rad] are treated as equal.
 _ZERO = 1e-9
 
 # Kinds of moments: crossing of the level, extremum near the level, and match of several deformations.
@@ -40,14 +40,14 @@ _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 # Between samples E'' may exceed the second differences. On random vibrations with at least 8 samples per period,
 # 25 % more covers 99 % of the true crossings.
 _BEND_RESERVE = 1.25
-# Three standard deviations contain 99.7 % of normal errors.
+# Number of standard deviations in the error of a time; 3 cover 99.7 % of normal errors.
 _DEVIATIONS = 3.0
 # Rounding errors are many and independent: 2.6 standard deviations of their sum cover 99 %.
 # They are added to the interpolation error as independent errors.
 _ROUNDING_DEVIATIONS = 2.6
 # The systematic misfit is mostly a vibration, whose peaks are sqrt(2) times its rms.
 _PEAK_OF_REST = sqrt(2)
-# Reserve, as a share of the output interval: even a close fit is only a model between the samples.
+# Safety margin as a share of the output interval, since even a close fit is only a model between the samples.
 _BETWEEN_SAMPLES = 1e-3
 
 
@@ -60,7 +60,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return E at a time, from the modes where they describe the record, else from the samples [energy]."""
+        """Return E at a time, from the modes if they describe the record there, else from the samples [energy]."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
@@ -137,11 +137,11 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # impossible even if the complete scatter of the fit were here
+            return None  # Even the complete scatter of the fit would be too small.
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         if (
             vibration > 0 and scatter <= _DROWNED * vibration
-        ):  # both energies may underflow
+        ):  # Both energies may underflow.
             return None
         finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
         return f"{finding}: the sign of the deformation is unknown"
@@ -160,11 +160,11 @@ class OscillatorEnergy(SampledEnergy):
 
     @property
     def before(self) -> float:
-        """Return a time just before the span, so that its first sample is treated like all others [time]."""
+        """Return a time just before the span, so that the span's first sample is treated like all others [time]."""
         return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
-        """Return crossing times, from samples before the span and exact in it, and whether the energy rises."""
+        """Return the crossing times, from samples before the span and exact inside it, and whether the energy rises."""
         times = np.maximum(
             self.mode.level_crossings(self.td, self.before), self.span.start
         )
@@ -204,7 +204,7 @@ class OscillatorEnergy(SampledEnergy):
         )
 
     def within(self, times: Samples) -> NDArray[np.bool_]:
-        """Return an array that is True for times in the window described by the modes."""
+        """Return for each time whether it lies in the window that the modes describe."""
         return (times >= self.span.start) & (times <= self.span.end)
 
     def _each(
@@ -215,7 +215,7 @@ class OscillatorEnergy(SampledEnergy):
     ) -> Samples:
         """Apply one function to times in the window described by the modes, another function to all others."""
         is_described = self.within(times)
-        if is_described.all():  # the usual case: modes describe all times
+        if is_described.all():  # Usually the modes describe all times.
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (
@@ -268,7 +268,7 @@ class Moments:
         )
 
     def are(self, kind: str) -> NDArray[np.bool_]:
-        """Return an array that is True for moments of a kind."""
+        """Return for each moment whether it is of this kind."""
         return np.asarray(self.kind == _KINDS.index(kind))
 
     def at(self, places: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Moments:
@@ -341,7 +341,7 @@ def compute_sampled_reach(
     td : float
         [time]
     level : float
-        Energy taken for that at td: of the samples or, where a fit tells it, off them by the fit's own error [energy].
+        Energy assumed at td, from the samples or, with its own error, from a fit [energy].
 
     Returns
     -------
@@ -386,7 +386,7 @@ def compute_fitted_reach(
     error = deviation[:-1] + deviation[-1]
     slope, bend = mode.energy_slopes(times)
     distance = compute_reach(np.abs(slope), np.abs(bend), error)
-    # the fit, not the output interval, limits the error of a crossing to a quarter of a period
+    # The error of a crossing is limited to a quarter of a period by the fit, not to an output interval.
     quanta = (
         _compute_half_quanta(history.time_precision, times)
         + history.time_precision.quantum(td) / 2
@@ -399,7 +399,7 @@ def compute_fitted_reach(
 
 
 def _estimate_local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
-    """Return the systematic misfit near each time: its rms, or more where the vibration is larger [energy]."""
+    """Return the systematic misfit near each time: its rms, increased where the vibration is larger [energy]."""
     return np.asarray(
         fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
     )
@@ -436,7 +436,7 @@ def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
 def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     """Return the largest |E''| near ``at``, from four second divided differences around it [energy/time^2].
 
-    Zero where the record has fewer than three samples.
+    It is zero if the record has fewer than three samples.
     """
     at = np.asarray(at, dtype=np.float64)
     if time.size < 3:
@@ -474,7 +474,7 @@ def compute_reach(
         steep = slope / error
         curved = (
             bend / error
-        )  # divided by the error: squares of energies might overflow
+        )  # Divided by the error, since squares of energies might overflow.
         root = steep**2 - 2 * curved
         regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
         turning = np.sqrt(2 / curved)

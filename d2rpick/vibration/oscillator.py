@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-# in quotes, because numpy.typing slows the start
+# In quotes to keep start-up fast, because numpy.typing is slow to import.
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Limits of stiffness and masses: beyond them products and quotients overflow; all unit systems are far from them.
+# Limits of stiffness and masses, far from the values in any unit system. Beyond them products and quotients overflow.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
@@ -50,7 +50,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Oscillator:
-    """Floating oscillator; RangeError unless stiffness and masses are from 1e-100 to 1e100 and alpha is finite.
+    """A floating oscillator; raise RangeError unless stiffness and masses are in 1e-100 to 1e100 and alpha is finite.
 
     ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time].
     A slightly negative alpha, as a fit to scattered samples may give, makes the motion grow.
@@ -94,7 +94,7 @@ class Oscillator:
         return float(np.sqrt(square)) if square >= 0 else float("nan")
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
-        """Return the state after ``elapsed`` time of free motion from ``start``, with any damping (7), (18).
+        """Return the state after the time ``elapsed`` of free motion from ``start``, with any damping, eqs. (7), (18).
 
         Parameters
         ----------
@@ -176,11 +176,11 @@ class Oscillator:
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
         for column, value in zip(states, start, strict=True):
-            column[:1] = value  # the first value is exactly the given one
+            column[:1] = value  # The first value equals the given one exactly.
         return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
-        """Return the state after ``elapsed`` time of rigid motion that begins at ``start`` (8)-(12).
+        """Return the state after the time ``elapsed`` of rigid motion that begins at ``start``, eqs. (8) to (12).
 
         At the switch momentum is kept, the relative velocity is lost and the deformation is frozen, so
         ``rigid(start, 0)`` is the state right after the switch.  Arguments as in ``free``.
@@ -226,8 +226,8 @@ class Oscillator:
     def _vibration(self, t: Values) -> tuple[Values, Values]:
         """Return exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
 
-        Overdamped, the sum of two decaying exponentials; their slower rate alpha/2 - kappa is taken from the
-        product of the rates, omega_0^2, because the difference would cancel.
+        If overdamped, it is the sum of two decaying exponentials.  The slower rate alpha/2 - kappa is computed
+        from the product of the rates, omega_0^2, because the difference would lose all digits.
         """
         square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
         if square >= 0:
@@ -244,7 +244,7 @@ class Oscillator:
 def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # the quotient of the smallest products has no digits; two terms of the series are exact there
+    # For tiny products the quotient loses its digits; two terms of the series are exact then.
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),
@@ -274,7 +274,7 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Return the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
+    """Return the energy mode of ``oscillator`` that is at rest at time 0 except for the frame velocity ``v0``, eq. (7).
 
     Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
     squared.
@@ -295,7 +295,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
 
 @dataclass(frozen=True)
 class Replay:
-    """Motion from ``start`` at time ``origin`` on, rigid from ``tr`` to ``td``; RangeError unless origin <= tr <= td.
+    """Motion from ``start`` at ``origin``, rigid from ``tr`` to ``td``; raise RangeError unless origin <= tr <= td.
 
     Times in the unit of the run.
     """
@@ -313,11 +313,11 @@ class Replay:
             )
 
     def reference(self, time: Values | float) -> State:
-        """Return the states of the run without switching at ``time`` (7)."""
+        """Return the states of the run without switching at ``time``, eq. (7) of the paper."""
         return self.oscillator.free(self.start, np.asarray(time) - self.origin)
 
     def motion(self, time: Values | float) -> State:
-        """Return the states of the switched run at ``time``: free (7), rigid (9)-(12), free again (18).
+        """Return the states of the switched run at ``time``: free, eq. (7), rigid, eqs. (9)-(12), free again, eq. (18).
 
         At tr itself, the state after the switch.
         """

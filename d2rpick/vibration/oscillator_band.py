@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 # Half-width of the band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
 # Largest R^2 of a hidden mode in opposite phase that leaves the stated residual as it is.
-# With a residual of 0.25, a pair is still nearly good, so the upper bound alone tells enough.
+# A pair with a residual of 0.25 is still nearly good, so it is enough to state the upper bound.
 _HARMLESS: Final = 0.25**2
-# Effect of a hidden share that consists of harmonics of a nonlinear spring.
-# R is wrong by up to half of the product of this factor and the share, even between the peaks.
+# Effect on R^2 of a hidden share that consists of harmonics of a nonlinear spring.
+# R has an error of up to half of this factor times the share, even between the peaks.
 _HARMONIC_COUNTS: Final = 8.0
 
 
@@ -55,7 +55,7 @@ def residual_band(
     stated_now, low, high = measures.band_about(
         squared, off, fit.hidden_share * opposed, fit.hidden_share * squared
     )
-    # beyond the errors of a solver, a hidden mode is as likely as none: the middle of what it adds is stated
+    # Beyond solver errors, a hidden mode is as likely as none, so half of what it may add is stated.
     beyond_solver = max(fit.hidden_share - SMALLEST, 0.0) * opposed
     notable = np.maximum(beyond_solver - _HARMLESS, 0.0)
     return np.sqrt(np.square(stated_now) + notable / 2), low, high

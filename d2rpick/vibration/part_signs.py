@@ -30,20 +30,20 @@ _CLEARLY = 0.5
 # A deformation that oscillates about zero has a mean of zero. Beyond this share of its mean size it oscillates about
 # a preload or plastic work, and a zero of the energy does not give its sign.
 _MOST_OFF_CENTRE = 0.5
-# Parts without a sign are left out if they have less than this share of the energy.
-# Then D changes by at most 0.2, the default tolerance.
+# Parts without a sign are ignored if they have less than this share of the energy,
+# because D changes then by at most 0.2, the default tolerance.
 MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = (
     "no few modes have its energy, with the signs that its minima give or on their own"
 )
-# The named parts have this share of the mismatch.
+# As many parts are named as have this share of the mismatch together.
 _NAMED_TOGETHER = 0.8
 
 
 def find_own_mode(
     time: Samples, energy: Samples, followed: PartMotion | None
 ) -> PartMotion | None:
-    """Return the motion of a single mode of a part if its misfit is clearly below that of ``followed``."""
+    """Fit a single mode to a part; return its motion if its misfit is clearly below the misfit of ``followed``."""
     fit = identify(time, energy, quick=True)
     if fit.mode is None or not _is_pure_vibration(fit):
         return followed
@@ -136,7 +136,7 @@ class SignedParts(SignedAmplitudes):
     def _by_zeros(
         self, places: Places, roots: Samples
     ) -> Iterator[tuple[int, PartMotion | str]]:
-        """Yield the motion of parts from the zeros of their energy, or the reason why it is unknown."""
+        """Yield the motion of each part from the zeros of its energy, or the reason why it is unknown."""
         lasting = np.gradient(self.time)
         for i, own_roots in zip(
             places.tolist(), find_all_zeros(self.time, roots[places]), strict=True
@@ -151,7 +151,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def _all(self) -> list[PartMotion | str]:
-        """Return all parts; if too much energy has no sign, the modes of smaller parts are not searched."""
+        """Return all parts; if too much energy has no sign, modes of smaller parts are not searched for."""
         motions = {
             **self._main,
             **dict(self._by_zeros(self._order[len(self._main) :], self._roots())),
@@ -179,7 +179,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
-        """Return the motion of each part with a sign; the common sign of all is arbitrary."""
+        """Return the motion of each part with a sign; the sign common to all parts is arbitrary."""
         return tuple(motion for motion in self._all if isinstance(motion, PartMotion))
 
     @property
@@ -241,7 +241,7 @@ class SignedParts(SignedAmplitudes):
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
-        )  # views: a copy for each td would fill the memory
+        )  # These are views, since a copy for each td would fill the memory.
 
     def residual_band(
         self, stated: Samples, tr: Samples, td: float

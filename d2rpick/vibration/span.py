@@ -1,4 +1,4 @@
-"""Find the window around td in which one oscillator describes the record, extended and fitted repeatedly."""
+"""Find the window around td in which one oscillator describes the record, by extending and fitting it repeatedly."""
 
 from __future__ import annotations
 
@@ -42,37 +42,37 @@ if TYPE_CHECKING:
             """Return V [energy]."""
 
 
-# Starts of trial windows as shares of the time before td, and ends as shares of the time after td.
+# Trial windows begin at the first shares of the time before td and end at the second shares of the time after td.
 # Any flight of several periods is mostly filled by one of these windows.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Ends before td, as shares of the time before td, because td itself may be in the next contact.
+# Further windows end before td, by these shares of the time before td, because td may be in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits.
-# Each mark is at this share of the distance of the next one.
+# The distance of each mark is this share of the distance of the next mark.
 _MARKS = 0.87
-# A window that an oscillator describes has at least this many periods and this share of the fitted samples.
-# Less may be an accident, or a transition in the record.
+# A window that an oscillator describes has at least the first number of periods and the second share of the fitted
+# samples. A smaller window may fit by chance, or contain a transition in the record.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# If an inner fit has a scatter below this share of the outer one, the ends do not belong to the flight.
+# The ends of a window do not belong to the flight if a fit without them reduces the scatter below this share.
 _MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator if the mean error over 1/25 period exceeds the largest of three limits:
-# this share of the vibration energy, this many standard errors, and this many times the systematic misfit.
+# a share of the vibration energy, a number of standard errors, and a multiple of the systematic misfit.
 # The mean uses at least three samples; white noise exceeds the limit once in a million means.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# An oscillator that describes this share of the bounds is used for every td in its window without further search.
+# An oscillator that describes this share of the bounds is used for every td in its window; no other is searched for.
 _MOST_OF_BOUNDS = 0.5
-# Most fits of the growing window; two are usual.
+# Largest number of fits of the growing window; two are usual.
 _MOST_REFITS = 8
 
 # Smallest share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06.
 # Real solvers have errors of this size.
 SMALLEST: Final = 1e-3
-_MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
-_FINER: Final = 4  # points per line of a spectrum, so that its peak is met
+_MOST_LINES: Final = 8192  # enough for 800 periods of the energy
+_FINER: Final = 4  # points per line of a spectrum, to resolve its peak
 _CELLS_PER_PERIOD: Final = (
-    4  # of the fastest line: with fewer, means over cells would hide most of it
+    4  # per period of the fastest line; fewer would average most of it out
 )
-# Times between which no state lies.
+# a pair of times without any state between them
 _NO_STATE: Final = (np.inf, np.inf)
 
 
@@ -94,7 +94,7 @@ def find_described_span(
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last one before td.
 
-    First a part of the record that one oscillator describes is searched, long ones first.  From there the window grows
+    First a part of the record that one oscillator describes is searched for, long ones first.  Then the window grows
     both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
 
     Parameters
@@ -103,13 +103,13 @@ def find_described_span(
     td : float
         [time]
     bounds : Span
-        Where to look [time].
+        The part of the record to search [time].
     oscillator : Mode, optional
-        Held against the samples instead of an oscillator that is fitted to them.
+        Compared with the samples, instead of an oscillator that is fitted to them.
     whole : bool
-        Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
+        Try only the bounds and their part up to td, because it is known that no load acts there.
     quick : bool
-        Compute no misfit of what is refused.
+        Do not compute the misfit of a refused fit.
 
     Returns
     -------
@@ -135,8 +135,8 @@ def find_longest_described(
 ) -> tuple[Span, Identification] | None:
     """Find a window with most of the ``bounds`` that one oscillator describes; None if none is found.
 
-    It is that of any td in it, whichever is asked for.  Since it holds the middle of the bounds, it is looked for
-    there.  One that is not found is found from its td.  ``whole`` as for `find_described_span`.
+    The window is the same for every td in it.  It is searched for in the middle of the bounds, which it contains.  A
+    smaller window is found only from its td.  ``whole`` has the same meaning as in `find_described_span`.
     """
     start, end = bounds
     middle = (start + end) / 2
@@ -156,7 +156,7 @@ def find_longest_described(
 def fit_window(
     history: History, window: Span, oscillator: Mode | None = None, *, quick: bool
 ) -> Identification:
-    """Fit an oscillator to the states in a window, or hold a given one against them; ``quick`` as for `identify`."""
+    """Fit an oscillator to the states in a window, or compare a given one with them; ``quick`` as for `identify`."""
     time, _ = history.between(*window)
     return _fit_states(history, get_ends(time), oscillator, quick)
 
@@ -165,7 +165,7 @@ def fit_window(
 def _fit_states(
     history: History, ends: tuple[float, ...], oscillator: Mode | None, quick: bool
 ) -> Identification:
-    """Fit the states between two of them, by their times; there are none if ``ends`` is empty."""
+    """Fit the states between two times; there are no states if ``ends`` is `_NO_STATE`."""
     time, energy = history.between(*(ends or _NO_STATE))
     if oscillator is not None:
         return judge_given(oscillator, time, energy, quick=quick)
@@ -174,7 +174,7 @@ def _fit_states(
 
 @remember
 def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex128]:
-    """Return the rates that the energies between two states show; quick and full fits share them."""
+    """Return the rates in the energies between two states; quick and full fits share them."""
     return find_rates(*history.between(*(ends or _NO_STATE)))
 
 
@@ -196,7 +196,7 @@ def find_span(
 ) -> Span | None:
     """Find the window around ``anchor`` [time], within ``bounds``, in which the record follows ``fit``.
 
-    It ends where the energy drifts off the fit; None if it is off at the anchor itself.
+    It ends where the energy deviates from the fit; None if it deviates at the anchor itself.
     """
     assert fit.mode is not None
     return _find_span_of_mode(history, anchor, bounds, fit.mode, fit.rms, fit.structure)
@@ -234,7 +234,7 @@ def _find_span_of_mode(
         ahead,
         states_behind,
     )
-    # the mean over ``width`` samples extends half of them beyond its middle
+    # A mean over ``width`` samples extends half of them beyond its middle.
     left_end = 0 if last_before is None else time.size - last_before + width // 2
     right_end = time.size - 1 if first_after is None else first_after - 1 - width // 2
     return (
@@ -246,7 +246,7 @@ def _find_span_of_mode(
 
 @np.errstate(
     over="ignore", invalid="ignore"
-)  # far from the window, a damped fit overflows
+)  # Far from the window, a damped fit overflows.
 def _find_first_off(
     time: Samples,
     energy: Samples,
@@ -258,7 +258,7 @@ def _find_first_off(
 ) -> int | None:
     """Return the index of the first mean, from ``first`` on, that exceeds its limit.
 
-    The search goes outwards block by block, so that no sum contains the large errors beyond the end that is searched.
+    The search goes outwards block by block, so that no sum contains the large errors beyond the end of the window.
     """
     for begin in range(first, time.size, BLOCK):
         inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
@@ -353,7 +353,7 @@ def _grow_span(
             _LEAST_PERIODS * 2 * np.pi / fit.mode.omega,
             _MOST * (window.end - window.start),
         )
-        # for a period much longer than the record, means would need far more samples than exist
+        # If the period is much longer than the record, means would need more samples than exist.
         possible = shortest <= bounds.end - bounds.start
         anchor = min(td, window.end)
         grown = _find_reach(history, bounds, anchor, fit) if possible else None
@@ -361,7 +361,7 @@ def _grow_span(
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            if not fit.describes_record:  # for example because the window is too short
+            if not fit.describes_record:  # for example, the window may be too short
                 return None, fit
             return _clear_ends(history, grown, fit, bounds, oscillator, quick=quick)
         span = grown
@@ -378,7 +378,7 @@ def _clear_ends(
     *,
     quick: bool,
 ) -> tuple[Span, Identification]:
-    """Fit the window again without half a period at the ends where the record leaves it.
+    """Fit the window again without half a period at each end where the record leaves the fit.
 
     There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
     samples much better, it determines the window.
@@ -399,7 +399,7 @@ def _clear_ends(
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
-    """Return the share of the vibration energy of a further mode that the misfit may contain [-].
+    """Return the share of the vibration energy that a further mode, hidden in the misfit, may have [-].
 
     That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
 
@@ -417,11 +417,11 @@ def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> floa
         s, integrate_by_trapezia(s, energy - model.energy(time)), count
     )
     decay = np.exp(-model.alpha * span * (np.arange(count) + 0.5) / count)
-    # from one period in the record to the fastest line that the cells resolve
+    # The range is from one period in the record to the fastest line that the cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     strongest = float(
         np.abs(np.fft.rfft(remainder * decay, _FINER * count))[visible].max()
     )
     amplitude = 2 * strongest / float(np.sum(decay**2))
-    # the energy of a mode oscillates by half of its vibration energy about the mean
+    # The energy of a mode oscillates about its mean by half of the vibration energy.
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turn is counted if the energy returns by this share of its last swing; less is noise or a faster mode.
+# A turning point is counted if the energy goes back by this share of its last change. Less is noise or a faster mode.
 _SWING: Final = 0.2
 # A minimum is above the lower envelope if it deviates from the line through its neighbours by this share.
 _OFF_FLOOR: Final = 0.02
-# If more than this share of the minima deviate, the others lie on the lower envelope by chance.
+# Half cycles are not counted if more than this share of the minima deviates; the others may be on a line by chance.
 _MOST_OFF: Final = 0.1
-_FEWEST: Final = 5  # minima that show a lower envelope
-# In a beat, a shorter half cycle differs from its longer neighbour at least by this share.
+_FEWEST: Final = 5  # fewest minima that define a lower envelope
+# In a beat, neighbouring half cycles differ in length by at least this share.
 _UNEVEN: Final = 0.03
 # Factor on the residual for any spring: the rate of a stiffening spring depends on the amplitude.
 # Over two periods after td its residual was up to 1.5 times that of a linear spring, with a preload up to 2 times.
@@ -50,7 +50,7 @@ class Swings(SignedAmplitudes):
     time, deformation : array of shape (n,)
         [time], [sqrt(energy)]; the sign as a whole is arbitrary.
     unclear : array
-        Times where the sign may turn or not: no two times on different sides can be compared.
+        Times at which the sign may or may not change. Times on different sides of such a time cannot be compared.
     envelope : Envelope
         Estimate of the vibration energy.
     bottoms, floor : array of shape (k,)
@@ -69,7 +69,7 @@ class Swings(SignedAmplitudes):
     undescribed: ClassVar = "the swings of the energy cannot be counted from here to td"
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return the signed deformation, of the shape of ``t`` with an axis of one before it [sqrt(energy)]."""
+        """Return the signed deformation, with the shape of ``t`` and a first axis of length one [sqrt(energy)]."""
         return np.asarray(np.interp(t, self.time, self.deformation))[np.newaxis]
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
@@ -101,7 +101,7 @@ class Swings(SignedAmplitudes):
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
-        )  # views: a copy for each td would fill the memory
+        )  # These are views, since a copy for each td would fill the memory.
 
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
@@ -172,7 +172,7 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
     unclear = np.sort(
         np.concatenate([bottom[is_off_floor], time[[1, open_end]]])
-    )  # minima next to the ends are not visible
+    )  # Minima next to the ends are not visible.
     return Swings(time, deformation, unclear, whole, bottom, floor)
 
 
@@ -200,10 +200,10 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
 
 
 def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
-    """Return the indices at which the energy turns, and the last turn that is completely visible."""
+    """Return the indices of the energy's turning points, and the last turning point that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    if 4 * turning_points.size > energy.size:  # so many turning points are noise
+    if 4 * turning_points.size > energy.size:  # So many turning points must be noise.
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
     turns = []

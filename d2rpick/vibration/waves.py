@@ -30,16 +30,17 @@ if TYPE_CHECKING:
     Complex = NDArray[np.complex128]
     Places = NDArray[np.intp]
 
-# Largest number of waves; more would fit almost any record.
+# Largest number of waves. More waves would fit almost any record.
 _MOST: Final = 6
-# Most samples for a search of rates, since the work grows with the third power.
-# With fewer than the second number of samples six waves cannot be found.
+# First: largest number of samples in the search for rates, whose cost grows with its third power.
+# Second: smallest number of samples with which six waves can be found.
 _MOST_SAMPLES, _LEAST_SAMPLES = 400, 36
-# Fewer waves are preferred if their misfit is at most 1.5 times that of more waves; below 1e-12 all is rounding.
+# First: fewer waves are preferred if their misfit is at most this many times the misfit of more waves.
+# Second: a relative misfit below this is rounding error.
 _AS_GOOD, _ROUNDING = 1.5, 1e-12
-# Eigenvalues of a matrix of products below this share of the largest are rounding.
+# Eigenvalues of the product matrix below this share of the largest are rounding errors.
 _ROUNDING_OF_SQUARES: Final = 1e-14
-# Largest exponent: outside the fitted record a decay grows backwards without end.
+# Largest exponent of a wave, since a decaying wave grows without limit before the fitted record.
 _LARGEST_EXPONENT: Final = 100.0
 
 # One choice of the sign must be this many times smoother than the other.
@@ -57,7 +58,7 @@ _TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
 _MOST_LEFT: Final = 0.01
 # A second plane with this share of the energy hides zeros or produces false ones.
 _MOST_HIDDEN: Final = 0.01
-# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear.
+# The sign is unclear if the deviation over a quarter period exceeds this share of the vibration energy.
 _OFF: Final = 0.2
 _MOST_OFF: Final = 0.5  # largest share of the samples with an unclear sign
 _ROUNDS: Final = 4  # repetitions until the fitted window contains all clear times
@@ -86,7 +87,7 @@ class Waves(NamedTuple):
         )
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        """Return signed deformations, with the shape of ``t`` and a first axis for waves [sqrt(energy)]."""
         return np.asarray(self._each(t).real)
 
     def deformation(self, t: Samples | float) -> Samples:
@@ -114,7 +115,7 @@ class Waves(NamedTuple):
         return np.asarray((turned.real**2).sum(axis=0))
 
     def _each(self, t: Samples | float) -> Complex:
-        """Return each complex wave, of the shape of ``t`` with an axis before it."""
+        """Return the complex waves, with the shape of ``t`` and a first axis for waves."""
         s = np.multiply.outer(self.rates, np.asarray(t, dtype=np.float64) - self.origin)
         waves = np.exp(np.minimum(s.real, _LARGEST_EXPONENT) + 1j * s.imag)
         return np.asarray(waves * self.weights.reshape(-1, *(1,) * np.ndim(t)))
@@ -184,12 +185,12 @@ def _fit(
         return None
     rates = (
         np.minimum(rates.real, 0.0) + 1j * rates.imag
-    )  # noise may make a free vibration grow
+    )  # Noise may make a free vibration seem to grow.
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
     weight = np.abs(
         deformation
-    )  # the root of the energy has half of its relative error
+    )  # The square root of the energy has half the relative error of the energy.
     solution = np.linalg.lstsq(
         basis * weight[:, np.newaxis], deformation * weight, rcond=None
     )[0]
@@ -199,7 +200,7 @@ def _fit(
 
 
 class Zeros(NamedTuple):
-    """Times at which a deformation passes zero or may pass zero, and end ranges in which this is invisible."""
+    """Times at which a deformation passes or may pass zero, and the ranges at the ends in which this cannot be seen."""
 
     sure: Samples
     doubtful: Samples
@@ -237,7 +238,7 @@ def _find_zeros(time: Samples, roots: Samples) -> list[Zeros]:
 
 
 def _list_unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
-    """Return the rows with doubtful zeros."""
+    """Return the row numbers with doubtful zeros."""
     return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
 
 
@@ -246,7 +247,7 @@ def _find_zeros_in(
 ) -> list[Zeros]:
     """Find the zeros of each row from the given samples and minima."""
     row, at = np.nonzero(minima)
-    # two samples on both sides show the curvature of the root; a minimum closer to an end remains unknown
+    # The curvature of the root needs two samples on both sides, so a minimum closer to an end remains doubtful.
     early = at < 2
     late = at >= time.size - 2
     row_of_zero = row[~early & ~late]
@@ -265,7 +266,7 @@ def _find_zeros_in(
         low, low + high, out=np.full(left_state.shape, 0.5), where=low + high > 0
     )
     sure = time[left_state] + share * (time[left_state + 1] - time[left_state])
-    # the zero of a minimum near an end may lie one sample further inwards
+    # The zero of a minimum near an end may lie one sample farther inside.
     ends = np.append(row[early], row[late])
     unseen = np.append(time[at[early] + 1], time[at[late] - 1])
     order = np.argsort(ends, kind="stable")
@@ -291,7 +292,7 @@ def _find_minima(values: Samples) -> NDArray[np.bool_]:
 
 
 def _measure_bends(times: Samples, values: Samples) -> Samples:
-    """Return the largest second difference of slopes in each row of five samples, for any number of tables."""
+    """Return the largest second difference of slopes for each five samples, with any leading axes."""
     slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
     return np.asarray(
         np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0)
@@ -299,7 +300,7 @@ def _measure_bends(times: Samples, values: Samples) -> Samples:
 
 
 class PartMotion(NamedTuple):
-    """A ``model`` of the vibration of a part, the times at which it is ``unclear``, and its ``hidden`` share.
+    """A ``model`` of a part's vibration, the times at which its sign is ``unclear``, and its ``hidden`` share.
 
     That is the share of the vibration energy that a further mode may have unseen [-].
     """
@@ -310,7 +311,7 @@ class PartMotion(NamedTuple):
 
 
 def follow_waves(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
-    """Compare a deformation with waves fitted to its clear times, which decide the doubtful signs.
+    """Fit waves to a deformation at times with a clear sign, and use the waves to decide the doubtful signs.
 
     Parameters
     ----------
@@ -337,7 +338,7 @@ def follow_waves(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | 
         modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
         missed = _average_around(miss, width) > _OFF * waves.vibration_energy(time)
-        # also next to it, where the mean still contains many correct values
+        # Times next to it are unclear too, although the mean there contains many correct values.
         is_missed = _average_around(missed.astype(np.float64), width) * width > 0.5
         fitted = stretch
         stretch = max(

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 # Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest number of similar modes with random phases: the energy of m modes has a standard deviation of 1/sqrt(8 m).
-# The nodes of a computed car show 100 such modes.
+# Largest assumed number of similar modes with random phases; a computed car had 100 such modes.
+# The energy of m such modes has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
 # Means of computed runs exceed the prediction from spectral lines by at most this share [-].
 _OF_SOLVER: Final = 0.005
-# Fewest states that show a fluctuation.
+# A fluctuation is determined from at least this many states.
 _FEWEST_STATES: Final = 8
 
 
 class MeanEnergyBounds(NamedTuple):
-    """Lowest and highest mean internal energy after td, over that of the reference run [-]."""
+    """Lowest and highest mean internal energy after td, relative to the reference run [-]."""
 
     low: float
     high: float
@@ -65,7 +65,7 @@ def bound_mean_energy(
     if situation.basis != "oscillator":
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
-    # parts that were not chosen may pass on their energy
+    # Vibrating parts that were not chosen may transfer their energy to the chosen parts.
     other_energy = situation.together.not_chosen.energy
     return MeanEnergyBounds(
         max(low, 0.0),
@@ -76,7 +76,7 @@ def bound_mean_energy(
 def _compute_mean_ratio(
     energy_tr: float, energy_td: float, elastic_td: float, whole: float
 ) -> float:
-    """Return the mean energy after td over that of the reference run [-].
+    """Return the mean energy after td, relative to the reference run [-].
 
     ``elastic_td`` and ``whole`` are the elastic and the whole vibration energy at td [energy].
     """
@@ -88,7 +88,7 @@ def _compute_mean_ratio(
 
 
 def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Return bounds of the elastic and the whole vibration energy at td, in matching pairs [energy]."""
+    """Return bounds of the vibration energy at td, as pairs of the elastic and the whole energy [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
@@ -104,7 +104,7 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
     damping_left = 1 / compute_mean_decay(situation, time)
-    # the mean energy exceeds the static energy by half of the vibration energy
+    # On average half of the vibration energy is internal energy, in addition to the static energy.
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
@@ -129,7 +129,7 @@ def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
 
 
 class Worth(NamedTuple):
-    """Largest energy of the vibration error relative to that of the next contact [-].
+    """Largest ratio of the energy of the vibration error to the energy of the next contact [-].
 
     ``contact`` is the energy that the next contact puts into the parts [energy].
     """
@@ -143,8 +143,8 @@ def compare_error_with_contact(
 ) -> Worth | None:
     """Compare the vibration error of a pair with the energy of the next contact; None if unknown.
 
-    The energy of the error is R^2 U(td).  If the residual is unknown, the worst one is used: that of equal levels with
-    opposite signs.
+    The energy of the error is R^2 U(td).  If the residual R is unknown, its largest value is used: that of equal levels
+    with opposite signs.
     """
     contact = find_energy_of_next_contact(situation.history, situation.flight)
     if contact is None or situation.at_rest:

@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch
 
 
-# Most candidates that are judged together: larger arrays are no faster, and noise makes tens of thousands per td.
+# Largest number of candidates that are judged together. Larger arrays are not faster, and noise makes tens of
+# thousands of candidates per td.
 _MOST: Final = 20_000
-_MORE: Final = 8  # growth of the number of td judged together: the first may have few candidates, later ones many
-# A residual that may be larger by this much gets a note [-].
+_MORE: Final = 8  # largest growth of the number of td judged together; later td may have many candidates
+# A candidate gets a note if its residual may be larger by this much [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
@@ -84,7 +85,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """Error by which candidates are ranked [-]: the residual, or the level error; infinite if unknown."""
+        """The error by which candidates are ranked [-]: the residual, or else the level error; infinite if unknown."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
@@ -92,7 +93,7 @@ class Candidate(Measured, Record):
 class Pair(NamedTuple):
     """A recommended (tr, td) [time].
 
-    Pairs of different td are compared by ``error``, which is the ``residual`` if that is known.
+    Pairs at different td are compared by ``error``, which is the ``residual`` if that is known.
     """
 
     tr: float
@@ -109,7 +110,7 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged:
-    """Candidate times for one or many td of a record, judged by flight, sign and tolerance.
+    """Candidates for tr at one or many td of a record, judged by flight, sign and tolerance.
 
     All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``situation_of`` is the
     index into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``,
@@ -130,7 +131,7 @@ class Judged:
         sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
         if len(moments_of_each) == 1:
-            # a noisy record has large arrays: keep them once
+            # A noisy record has large arrays, which must not be copied.
             moments = moments_of_each[0]
             place = np.broadcast_to(np.int32(0), sizes[0])
         else:
@@ -196,7 +197,7 @@ class Judged:
 
     @property
     def recommendable(self) -> NDArray[np.bool_]:
-        """True for each acceptable candidate within the limits of the settings: the rule of ``suggest``, ``verify``."""
+        """True for each candidate that ``suggest`` and ``verify`` accept: without objections and within all limits."""
         return self.acceptable & self.within_limits
 
     @property
@@ -229,14 +230,14 @@ class Judged:
 
     @property
     def modal(self) -> NDArray[np.bool_]:
-        """True for each candidate that is judged by many modes, shape (n,)."""
+        """True for each candidate that is judged with many modes, shape (n,)."""
         return np.array([situation.basis == "modal" for situation in self.situations])[
             self.situation_of
         ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of many modes in the last part of the flight before td, which saves little."""
+        """True for each candidate of many modes that saves little, because it lies shortly before td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
@@ -253,7 +254,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Select the rows of candidates without objections, ascending."""
+        """Return the row numbers of the candidates without objections, ascending."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
@@ -262,10 +263,10 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Lazy sequence of the candidates of one td in a given order; each is built on access.
+    """A lazy sequence of the candidates of one td in a given order; each candidate is built when it is accessed.
 
-    ``order`` has the rows of the candidates in ``judged``; they are ranked if ``ranked`` is True.  ``recommended`` is
-    the place of the recommended candidate in ``order``, None without one.
+    ``order`` has the row numbers of the candidates in ``judged``; these are ranked if ``ranked`` is True.
+    ``recommended`` is the position of the recommended candidate in ``order``, None without one.
     """
 
     situation: Situation
@@ -286,12 +287,12 @@ class Candidates(Sequence[Candidate]):
 
     @cached_property
     def chosen(self) -> Candidate | None:
-        """The recommended candidate, None without one."""
+        """The recommended candidate; None without one."""
         return None if self.recommended is None else self[self.recommended]
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The recommended pair, which is computed faster than the candidate; None without one."""
+        """The recommended pair, which is faster to compute than the candidate; None without one."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
@@ -311,7 +312,7 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def saving(self) -> Pair | None:
-        """The recommended pair if it saves run time, else None."""
+        """The recommended pair, if it saves run time; otherwise None."""
         return None if self.pair is None or self.pair.same_swing else self.pair
 
     def __len__(self) -> int:
@@ -322,11 +323,11 @@ class Candidates(Sequence[Candidate]):
     @overload
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
-        """Make the candidate, or the candidates, at a place of the order."""
+        """Build the candidate at a position of the order, or the candidates of a slice."""
         if not isinstance(place, slice):
             i = range(len(self))[place]
             return self[i : i + 1][0]
-        # The accuracy of a time takes longer than the choice, so it is computed only on access.
+        # The accuracy of a time takes longer to compute than the choice, so it is computed only on access.
         reach = self.situation.vibration.reach(
             _mark_given_as_matches(
                 self.situation, self.judged.moments.at(self.order[place])
@@ -346,7 +347,7 @@ class Candidates(Sequence[Candidate]):
             name: _replace_nan(column[i].item())
             for name, column in judged.columns.items()
         }
-        # True if the deformation at tr was compared with that at td
+        # True if the deformations at tr and td were compared
         is_compared = values["sign_match"] is not None
         values["sign_match"] = values["sign_match"] > 0 if is_compared else None
         history = situation.history
@@ -400,11 +401,11 @@ def _replace_nan(value: Any) -> Any:
 def judge_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
 ) -> Iterator[Judged]:
-    """Judge all level crossings before td, extrema near the level and closest matches, in time order.
+    """Judge all candidates before td in time order: level crossings, extrema near the level, and closest matches.
 
     If nothing vibrates in the flight, its start is the only candidate.  With ``in_flight``, candidates before the
-    flight may be left out, since none of them is acceptable: noise in a long record makes tens of thousands.  All
-    situations must have one record and one set of rules.  As many td are judged at once as have ``most`` candidates.
+    flight may be omitted: none of them is acceptable, and noise in a long record makes tens of thousands.  All
+    situations must have the same record and rules.  Several td are judged together, up to ``most`` candidates.
     """
     first, together = 0, 1
     while first < len(situations):
@@ -433,7 +434,7 @@ def judge_times(situation: Situation, times: Iterable[float]) -> Candidates:
 
 
 def _find_start_at_rest(situation: Situation) -> Moments | None:
-    """Return the start of a flight in which nothing vibrates, rounded up to printed digits; None if it vibrates."""
+    """Return the start of a flight, rounded up to printed digits, if nothing vibrates in the flight; otherwise None."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
@@ -443,7 +444,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Mark each given tr that coincides with a match as a match, since it has the same accuracy."""
+    """Give each tr that coincides with a match the kind "match", since it has the same accuracy."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
@@ -484,11 +485,11 @@ def _list_remarks(
     measured: Mapping[str, Any],
     parts: Sequence[PartMatch],
 ) -> Iterator[str]:
-    """Yield notes on a tr that do not concern its acceptance."""
+    """Yield the notes on a tr that do not affect whether it is acceptable."""
     if not (measured or situation.vibration.unknown or situation.at_rest):
         yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
     if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
-        # imported here: tables have no parts
+        # Imported here to keep start-up fast.
         from d2rpick.vibration.part_signs import (
             name_main_contributors,
         )

@@ -1,6 +1,6 @@
-"""Give one verdict on a pair, with its reason, the expected and the worst motion after td, and a better pair.
+"""Decide on one verdict for a pair, with its reason, the expected and the worst motion after td, and a better pair.
 
-All commands, forms and pages take their words from here, so that none contradicts another.
+All commands, output forms and pages use the texts of this module, so that they cannot contradict each other.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
 
-# Cures of a pair that is not admissible: one for any pair,
-# and one for a recommended pair that is contradicted by its finished switched run.
+# Cures for a pair that is not admissible. The first is for any pair, the second for a recommended pair
+# that its finished switched run contradicts.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
@@ -34,7 +34,7 @@ _USE_BEST: Final = (
     "or make fewer parts rigid (d2rpick parts)"
 )
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid (d2rpick parts)"
-# A worst case that differs by less from the expected residual is not shown separately [-].
+# The worst case is not shown separately if it exceeds the expected residual by less than this [-].
 _ALIKE: Final = 5e-3
 
 
@@ -46,7 +46,7 @@ class Decision(NamedTuple):
     grade : str
         "good", "fair" or "poor"; `verdict` gives it in words.
     quality : Quality
-        The two grades that it rests on: of motion and of vibration.
+        The grades of motion and vibration from which ``grade`` follows.
     objections : tuple of str
         Reasons why the pair is not admissible; empty if it is.
     at_rest : bool
@@ -60,7 +60,7 @@ class Decision(NamedTuple):
     better : Pair or None
         A better pair, if one was searched and found.
     cure_of_objections : str
-        What to do about the objections without a better pair.
+        What to do about the objections if there is no better pair.
     best_of : (float, float) or None
         Range of td of which the pair is the best [time]; None if not all its td were compared.
     """
@@ -125,7 +125,7 @@ class Decision(NamedTuple):
 
     @property
     def cure(self) -> str:
-        """Change that would make the pair better; empty if it is good."""
+        """The change that would make the pair better; empty if the pair is good."""
         if self.grade == GOOD:
             return ""
         if self.better is not None:
@@ -153,7 +153,7 @@ def decide(
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
 ) -> Decision:
-    """Decide on a tr in a situation; any ``objections`` make it inadmissible, ``better`` is a better pair.
+    """Decide on a tr in a situation. Any ``objections`` make it inadmissible; ``better`` is a better pair.
 
     Without a better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which
     the pair is the best [time], if all were compared.
@@ -186,7 +186,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is preserved, or hardly matters."""
+    """Explain why a pair is good: its vibration is preserved, or the error of the vibration hardly matters."""
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f": it is wrong by {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
@@ -194,7 +194,7 @@ def _explain_why_good(quality: Quality, residual: float | None) -> str:
 
 
 def _explain_raised_grade(quality: Quality) -> str:
-    """Explain why the error of the vibration hardly matters; empty if the vibration is graded by itself."""
+    """Explain why the error of the vibration hardly matters; empty if this did not raise the grade."""
     if quality.worth is None or quality.alone.grade == quality.vibration.grade:
         return ""
     share = quality.worth.share
@@ -202,7 +202,7 @@ def _explain_raised_grade(quality: Quality) -> str:
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Write the bounds of the mean energy, as one number if both look alike."""
+    """Format the bounds of the mean energy; as one number if both are displayed alike."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# Files that LS-DYNA usually writes more often than d3plot.
+# LS-DYNA usually writes these files more often than a d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
 def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     """Yield a warning if the states up to td are too few for the level at td: fewer than 10 per visible period.
 
-    If no period is visible, all periods may have been missed, since a d3plot has some hundred states at most.
+    If no period is visible, the output may be too coarse to show any, since a d3plot has a few hundred states at most.
     """
     history = situation.history
     td = situation.td

@@ -1,10 +1,10 @@
-"""Define the grades of a pair and their verdicts; separate from the grading, which needs numpy."""
+"""Define the grades of a pair and their verdicts, without importing numpy, which the grading itself needs."""
 
 from __future__ import annotations
 
 from typing import Final
 
-# In order from the worst to the best.
+# The grades in ascending order.
 POOR: Final = "poor"
 FAIR: Final = "fair"
 GOOD: Final = "good"

@@ -27,37 +27,36 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History, Samples
 
-# Deformation errors within this difference of the smallest are equally good [-]; then the earliest safe tr is chosen.
+# Deformation errors that exceed the smallest by at most this are treated as equal [-]; the earliest safe tr is chosen.
 EQUALLY_GOOD = 0.02
-# Level errors within this difference have similar quality [-]: the level gives the mean energy after td to 10 % at
-# best.
-# It changes by as much while td moves by less than the margin, and a timing tolerance allows the same change.
+# Level errors that differ by at most this are treated as equal [-], because the level predicts the mean energy after
+# td to 10 % at best. A shift of td within the margin changes it by as much, and a timing tolerance allows as much.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Largest level error of a crossing by rounding, for levels above this share of the highest energy [-].
+# Largest level error that rounding causes at a crossing [-], for levels above this share of the highest energy.
 ROUNDING: Final = 1e-3
-# Decimals to which errors are compared.
-# Pairs of equal error, as in all cycles of one mode, differ by rounding, which must not decide their order.
+# Errors are compared to this many decimals. Pairs with equal errors, as in all cycles of a single mode,
+# differ only by rounding, which must not determine their order.
 _DECIMALS: Final = 4
-# Rigid times within this share of the longest are similar; then a small position error decides [-].
+# Rigid times within this share of the longest are treated as equal [-]; a small position error is then preferred.
 _LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-]: the default tolerance for tr.
 MOST_GOOD = 0.2
-# Largest residual of a good pair if the record may hide a further mode [-], since a good grade is a promise.
+# Largest residual of a good pair, including what a hidden mode may add to it [-]; a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
-# An energy has passed its mean if it is beyond it by this share of the standard deviation; less may be noise.
+# An energy has crossed its mean once it exceeds it by this share of the standard deviation. Less may be noise.
 _BAND: Final = 0.25
-# Limits for the energy of the vibration error as a share of that of the next contact [-].
-# Below the first a pair is good, below the second fair (docs/explanation/validation-vibration.md).
+# Limits of the energy of the vibration error, as a share of the energy of the next contact [-].
+# A pair below the first limit is good, a pair below the second is fair (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
-_NAMED: Final = 5  # number of parts that a sentence names
+_NAMED: Final = 5  # largest number of parts that a sentence names
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
 def rank_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Yield the candidates of each td of one record, ranked, one of them recommended."""
+    """Yield, for each td of a record, its ranked candidates and which of them is recommended."""
     return chain.from_iterable(
         map(rank_judged, judge_candidates(situations, in_flight=in_flight))
     )
@@ -99,15 +98,15 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
 
 def get_limit_of_like_quality(situation: Situation) -> float:
-    """Return the largest difference between errors of similar quality [-]: of deformations, or of levels."""
+    """Return the largest difference between errors that are equally good [-], for deformations or for energy levels."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
 def _get_limit_of_alike(situation: Situation) -> float:
-    """Return the error up to which all pairs are of like quality [-].
+    """Return the error up to which all pairs are equally good [-].
 
-    R of many modes is another one at each tr.  A residual far below that of a good pair is worth less than a longer
-    rigid time.
+    With many modes the residual differs at each tr.  A residual far below the limit of a good pair is worth less than a
+    longer rigid time.
     """
     return MOST_GOOD if situation.basis == "modal" else 0.0
 
@@ -120,7 +119,7 @@ def order_by_quality(
     room: Samples,
     alike: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of candidates by group; in each group those of similar quality come first.
+    """Return the order of the candidates by group; in each group, the equally good best candidates come first.
 
     Their error is within ``room`` of the smallest, or below ``alike``; both have shape (groups,), the other arguments
     shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
@@ -154,16 +153,16 @@ def order_by_quality(
 def _find_extremes(
     extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Return the smallest or largest value of each group, by the function ``extreme``."""
+    """Return the smallest or largest value of each group; ``extreme`` is ``np.minimum`` or ``np.maximum``."""
     extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
     extreme.at(extremes, group, values)
     return extremes
 
 
 class Excess(NamedTuple):
-    """A limit of a recommendation that a pair exceeds, or that cannot be judged, with its ``message``.
+    """A limit that a pair exceeds, or for which the value is unknown, with its ``message``.
 
-    ``is_td_wrong``: the value is known, and belongs to td, so that no tr helps.
+    ``is_td_wrong`` is True if the value is known and depends on td only, so that no other tr helps.
     """
 
     message: str
@@ -173,7 +172,7 @@ class Excess(NamedTuple):
 def list_exceeded_limits(
     situation: Situation, candidate: Candidate
 ) -> tuple[Excess, ...]:
-    """Return the limits of the settings that a candidate exceeds, or that cannot be judged."""
+    """Return the limits of the settings that a candidate exceeds, or for which its value is unknown."""
     exceeded = []
     for limit, value in situation.settings.limits:
         of_td = limit.quantity not in candidate._fields
@@ -213,7 +212,7 @@ class Grade(NamedTuple):
 
     @classmethod
     def of(cls, poor: Sequence[Cause], fair: Sequence[Cause]) -> Grade:
-        """Make a grade from the causes for "poor", else from those for "fair"."""
+        """Make a grade: "poor" if there are causes for it, else "fair" if there are causes for that, else "good"."""
         if poor:
             return cls("poor", tuple(poor))
         return cls("fair", tuple(fair)) if fair else cls("good")
@@ -238,7 +237,7 @@ def grade_residual(residual: float) -> str:
 
 
 class Quality(NamedTuple):
-    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td; the worse one is used.
+    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse grade is used.
 
     ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
     relative to the next contact, None if that is unknown.
@@ -256,7 +255,7 @@ class Quality(NamedTuple):
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """Causes why the grade is not better, with their cures."""
+        """The causes that keep the grade from being better, with their cures."""
         statements = (self.motion, self.vibration)
         worst = [part.causes for part in statements if part.grade == self.grade]
         return tuple(chain.from_iterable(worst))
@@ -268,7 +267,7 @@ class Quality(NamedTuple):
 
 
 def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade the recommended tr of a td: its motion, and its vibration, also relative to the next contact."""
+    """Grade the recommended tr of a td: its motion, and its vibration, also in comparison with the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
     ruined = [Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined]
@@ -313,7 +312,7 @@ def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def _describe_unknown_direction(situation: Situation) -> Cause:
-    """Return the cause that the directions of the deformation at tr and td are unknown."""
+    """Return the cause "the directions of the deformation at tr and td are unknown", with its cure."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(
@@ -335,7 +334,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Return the cause that the vibration after td is wrong, and whether to change tr or td."""
+    """Return the cause "the vibration after td is wrong", with the cure: to change tr or td."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
@@ -355,7 +354,7 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
 def _list_causes_of_record(
     history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
-    """Return the causes why no level can be read from the samples of the flight, from its start up to td."""
+    """Return the causes why the states of the flight up to td do not show the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
@@ -378,7 +377,7 @@ def _list_causes_of_record(
 
 
 def rate_certainty_of_tr(best: Candidate) -> int:
-    """Rate how well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, otherwise 0."""
+    """Rate the accuracy of tr: 2 if better than the timing tolerance, 1 if sufficient for a good pair, otherwise 0."""
     if best.tr_high is None or best.timing_tolerance is None:
         return 2
     if _is_loose(best):
@@ -387,7 +386,7 @@ def rate_certainty_of_tr(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Return True if the frozen-deformation error may exceed that of a good pair, within the accuracy of tr."""
+    """Return True if the accuracy of tr is too poor for a good pair: the frozen-deformation error may be too large."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -429,7 +428,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def count_states_per_period(energy: Samples) -> float | None:
-    """Return the average number of samples per period of the energy (it passes its mean twice); None without one.
+    """Return the average number of samples per energy period (two crossings of the mean); None without a period.
 
     Examples
     --------

@@ -53,18 +53,18 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Largest error of a solver's energy, as a share of the highest energy [-].
+# Largest error of the energies that a solver writes, as a share of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
 # A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
-# Rounding: a constant energy may alternate between two printed values, each off by half a digit.
+# Rounding error in units of the last digit: a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
 
 def is_at_rest(
     history: History, flight: tuple[float, float | None], td: float, *, deformed: bool
 ) -> bool:
-    """Return True if the energy in ``flight`` is round-off, or fluctuates by no more than solver noise.
+    """Return True if the energy in ``flight`` is only round-off, or fluctuates by no more than solver noise.
 
     ``flight`` is (start, end) [time], with end None if it is unknown.  Free flight excites no vibration: whatever
     vibrates in a part of the flight has vibrated from its start.  So the whole flight is tested if its end is known,
@@ -75,7 +75,7 @@ def is_at_rest(
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples to show a vibration
+    if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples for a vibration
         return False
     # this is 0 if no energy is written at all
     rounding = round_off(history)
@@ -87,10 +87,10 @@ def is_at_rest(
 
 
 def _find_faint_fluctuation(history: History, start: float) -> float:
-    """Return the largest fluctuation of the energy that counts as no vibration [energy].
+    """Return the fluctuation of the energy up to which the flight is treated as free of vibration [energy].
 
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
-    ``start`` of the flight [time].  What falls was elastic, at least; plastic work stays.
+    ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
     """
     energies = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
@@ -106,7 +106,7 @@ def _find_highest_energy(history: History) -> float:
 
 
 class AnswerAtTd:
-    """Base class of answers about one td; ``situation`` describes that td."""
+    """Base class of the answers about one td; ``situation`` describes that td."""
 
     situation: Situation
 
@@ -151,12 +151,12 @@ class Situation:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Reliable model of the vibration at td."""
+        """The vibration model at td that is reliable enough for the choice."""
         return model_at(self.whole, self.evidence)
 
     @cached_property
     def whole(self) -> Vibration:
-        """Model of the vibration in the energy of all chosen parts."""
+        """The vibration model for the energy of all chosen parts together."""
         return find_energy_at(self.history, self.td, self.evidence)
 
     @property
@@ -175,7 +175,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # without a vibration the fraction is undefined
+        return share  # NaN, because the fraction is undefined without a vibration
 
     @property
     def earliest_tr(self) -> float | None:
@@ -205,7 +205,7 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin of a chosen td: the given one, or the time by which the next contact may come earlier."""
+        """The margin of a chosen td: the given margin, or the time by which the next contact may come earlier."""
         return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
@@ -220,7 +220,7 @@ class Situation:
 
     @cached_property
     def bodies(self) -> Bodies | None:
-        """Drift in flight of the rigid bodies that the parts become; None without data of parts."""
+        """Drift in flight of the rigid bodies that the parts become; None without part data."""
         return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
@@ -230,7 +230,7 @@ class Situation:
         return self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors that the tolerance limits, in the shape of ``times`` [-]; 0 if nothing vibrates."""
+        """Return the errors to which the tolerance applies, in the shape of ``times`` [-]; 0 if nothing vibrates."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
 
     @property
@@ -248,13 +248,13 @@ class Situation:
         )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Return the times in (start, end] of the energy peaks, ascending: of the oscillator, else of the samples."""
+        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or else the samples."""
         return describe_energy_at(self.history, self.td, self.evidence).peaks(
             start, end
         )
 
     def sees_as(self, situation: Situation) -> bool:
-        """Return True if both situations belong to one record, flight and evidence, and differ in td only."""
+        """Return True if both situations have the same record, flight and evidence, and differ only in td."""
         return (
             self.evidence.is_that_of(situation.evidence)
             and self.flight == situation.flight
@@ -272,10 +272,10 @@ def examine_td(
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and the vibration in it; what many td share is computed once for the history.
+    """Find the flight around ``td`` and the vibration in it; results that many td share are computed once per history.
 
     Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
-    searched again, and the misfit of a refused oscillator is not computed.
+    searched for again, and the misfit of a refused oscillator is not computed.
 
     Raises
     ------
@@ -284,7 +284,7 @@ def examine_td(
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
-    # if nothing flies at td, the oscillator of the nearest flight shows which pairs exist there
+    # If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
     if seen.refusal and seen.flight:
         fitted_at = (seen.flight.start + seen.flight.end) / 2
     else:
@@ -328,24 +328,24 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
 def _find_other_models(
     situation: Situation, *, is_flying: bool
 ) -> dict[str, SignedModel]:
-    """Find the models of the vibration that are needed beside the oscillator; ``is_flying``: td is seen to fly."""
+    """Find the vibration models needed in addition to the oscillator; ``is_flying`` is True if the parts fly at td."""
     history = situation.history
     td = situation.td
     flight = situation.flight
     first = float(history.time[0])
     last = float(history.time[-1])
-    # without evidence of the next contact nothing is known about the time after td
+    # Without evidence of the next contact, nothing is known about the time after td.
     is_described = situation.evidence.span is not None or flight.source == "oscillator"
     end = flight.end or (last if is_flying or is_described else td)
     start = first if flight.start is None else flight.start
     around = Span(min(td, start), end)
     is_guessed = flight.start is not None and flight.source == "energy"
     if is_guessed:
-        # imported here: better evidence does not need it
+        # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
 
-        # the energy alone shows a slightly different flight to each td; signs of parts are followed in few windows,
-        # since times at which a load still acts are told from the vibration
+        # The energy alone shows a slightly different flight for each td. Part signs are followed in few, wider windows,
+        # because the vibration itself shows the times at which a load still acts.
         around = get_outer_window(history, around)
     models = find_part_signs(history, around)
     is_sign_known = any(model.signed for model in models.values())
@@ -370,7 +370,7 @@ def make_look(
     *,
     quick: bool = True,
 ) -> Look:
-    """Return a function that examines a record at a td, and caches its answer for each td.
+    """Return a function that examines a record at a td and caches the situation for each td.
 
     No flight is assumed to begin before ``since`` [time].  ``quick`` has the same meaning as in the examination of one
     td.
@@ -408,7 +408,7 @@ def _find_flight_at(
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
     """Limit a flight to the time in which no support holds the parts.
 
-    A flight found by the momenta of the parts is limited already.
+    A flight that was found from the part momenta is already limited in this way.
     """
     if flight.start is None or flight.refusal or flight.by_parts:
         return flight
@@ -427,7 +427,7 @@ def _find_oscillator(
     *,
     quick: bool,
 ) -> tuple[Identification | None, Span | None]:
-    """Return the oscillator, given or identified, and the window around td that it describes."""
+    """Return the given or the identified oscillator, and the window around td that it describes."""
     if not settings.replay:
         return None, None
     whole = bool(evidence.flight or evidence.refusal)
@@ -463,7 +463,7 @@ def _find_window_of_modes(
     """Return a window described by modes if only the energy can show a flight, otherwise None."""
     if evidence.flight or evidence.refusal or not settings.replay:
         return None
-    # imported here: most records do not need it
+    # Imported here to keep start-up fast.
     from d2rpick.vibration.modal_span import (
         find_described,
     )
@@ -481,7 +481,7 @@ def _find_window_of_modes(
 
 
 def _add_hidden_share(history: History, fit: Identification) -> Identification:
-    """Add to an accepted fit the share of the energy that a further mode may have in the residuals."""
+    """Add to an accepted fit the share of the energy that a further mode, hidden in the residuals, may have."""
     if not fit.describes_record or fit.mode is None:
         return fit
     return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
@@ -491,7 +491,7 @@ def _add_hidden_share(history: History, fit: Identification) -> Identification:
 def _estimate_what_is_hidden(
     history: History, start: float, end: float, _: float, *, fit: Identification
 ) -> Identification:
-    """Return a fit with the hidden share; one fit has one result, by which situations see that they share it."""
+    """Return a fit with its hidden share; it is cached, so that situations can recognise that they share a fit."""
     assert fit.mode is not None
     share = estimate_hidden_share(*history.between(start, end), fit.mode)
     return fit._replace(hidden_share=max(fit.hidden_share, share))
@@ -502,8 +502,8 @@ def _skip_first_quarter(
 ) -> Described | None:
     """Return the window of an oscillator without its first quarter period, unless the record begins with it.
 
-    While the deformation passes through zero, its energy hardly shows that a load still acts: 10 % of the amplitude and
-    more.  At the largest deformation 1 % shows.  Each quarter period contains one of both.
+    While the deformation passes through zero, the energy does not show a load below 10 % of the amplitude.  At the
+    largest deformation it shows 1 %.  Each quarter period contains a zero or a largest deformation.
     """
     if span is None or fit is None or fit.mode is None:
         return None

@@ -21,7 +21,7 @@ class PartsTogether:
     @cached_property
     def not_chosen(self) -> Beside:
         """Parts that vibrate with the chosen ones but were not chosen."""
-        # imported here: an oscillator does not need it
+        # Imported here to keep start-up fast.
         from d2rpick.flight.vibrating import (
             find_vibrating_parts,
         )
@@ -36,7 +36,7 @@ class PartsTogether:
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
         """Kinetic energy of the parts that vibrate together, at times in the flight; None if it is not written."""
-        # imported here: an oscillator does not need it
+        # Imported here to keep start-up fast.
         from d2rpick.flight.vibrating import (
             extract_kinetic_energy,
         )

@@ -36,29 +36,29 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# States per period of the energy below which undetected faster modes may matter.
+# With fewer states per energy period than this, undetected faster modes may matter.
 _FEW_STATES = 4
-# Kinetic fraction beyond which more than half of the vibration is lost at td for every tr [-].
+# If the kinetic fraction exceeds this, more than half of the vibration is lost at td for every tr [-].
 POOR_KINETIC_SHARE = 0.5
-# Residual above which a pair is poor [-]: 0.5 is 25 % of the vibration energy,
-# and the error is visible in the motion after td.
+# A pair with a larger residual is poor [-]. At 0.5 the error has 25 % of the vibration energy,
+# and is visible in the motion after td.
 POOR_RESIDUAL = 0.5
-# Plastic energy above this share of the vibration energy gets a warning [-]: it may also be a preload.
+# A plastic energy above this share of the vibration energy gets a warning [-], since it may also be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Static energy as a share of the lowest energy in flight [-]: many modes are never at rest at the same time.
-# This share predicts the means of 12 switched runs of a car to within 0.03, those of a shell box to -0.05 to 0.16.
-# The lowest energy itself gives 0.06 to 0.09 and up to 0.19 too much.
+# Assumed static energy as a share of the lowest energy in flight [-], since many modes are never at rest together.
+# With it, the predicted mean energies after td have errors of up to 0.03 in 12 switched runs of a car,
+# and of -0.05 to 0.16 for a shell box. With a share of 1 they would be up to 0.09 and 0.19 too high.
 _AT_REST = 0.85
 # Largest mean energy after td relative to the reference run [-]. Switching adds no energy,
-# so a larger ratio means that a contact lies in the flight. The estimate itself is right to within 20 %.
+# so a larger ratio means that there is a contact in the flight. The estimate itself is accurate to 20 %.
 MOST_KEPT = 1.2
-# Largest exponent of e, near the largest double.
+# largest exponent of e that does not overflow
 _LARGEST_EXPONENT = 700.0
 
 
 def warn_about_td(situation: Situation) -> Iterator[Caution]:
-    """Yield all warnings about a situation, those about the input first."""
+    """Yield all warnings about a situation, beginning with those about the input."""
     if not situation.history.complete:
         yield Caution(
             "truncated-input",
@@ -173,7 +173,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if the body only grazes the contact that ends the flight, with its earliest time."""
+    """Yield a warning, with the earliest contact time, if the body only grazes the contact that ends the flight."""
     flight = situation.flight
     margin = situation.expected_margin
     if (
@@ -196,7 +196,7 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if a flight shown by more than the energy of the parts is not certain, with a cure."""
+    """Yield a warning with a cure if a flight is uncertain although more than the energy of the parts shows it."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
@@ -221,7 +221,7 @@ def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
 
 
 def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
-    """Yield warnings if a part frozen at ``tr`` makes the position error at td too large, or it is unknown."""
+    """Yield warnings if the position error at td is unknown or, due to a part frozen at ``tr``, too large."""
     bodies = situation.bodies
     if bodies is None:
         return
@@ -261,7 +261,7 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe parts that are not connected to the others and separate from them."""
+    """Describe the parts that are not connected to the others and move away from them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -314,7 +314,7 @@ def _describe_nearest_flight(situation: Situation) -> str:
 
 
 class Expectation(NamedTuple):
-    r"""Estimates for a vibration of many modes; the fields are the keys of the JSON output.
+    r"""Estimates for a vibration with many modes; the fields are the keys of the JSON output.
 
     Such a vibration shares its energy equally between internal and kinetic energy.  The locked-in energy above the
     energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
@@ -335,7 +335,7 @@ class Expectation(NamedTuple):
     kinetic_share : float
         Kinetic fraction of the vibration energy at td, 1 - E(td)/(2 <E>) [-].
     ratio : float or None
-        Mean of E after td over that of the reference run if E(tr) is locked in; None without a tr [-].
+        Mean of E after td, relative to the reference run, if E(tr) is locked in [-]; None without a tr.
     ratio_low : float or None
         Ratio if all of E(tr) vibrates, undamped: E(tr)/(2 <E>) [-].
     ratio_at_level : float
@@ -353,8 +353,8 @@ class Expectation(NamedTuple):
 class Means(NamedTuple):
     """Energies that determine the mean energy after td [energy].
 
-    ``mean`` and ``lowest`` are those of the flight, ``resting`` does not vibrate, ``mean_after`` is the mean of the
-    reference run after td.
+    ``mean`` and ``lowest`` refer to the flight, ``resting`` is the energy that does not vibrate, and ``mean_after`` is
+    the mean of the reference run after td.
     """
 
     mean: float
@@ -363,17 +363,17 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td over that of the reference run [-] if ``locked`` is locked in [energy]."""
+        """Return the mean energy after td, relative to the reference run [-], if ``locked`` is locked in [energy]."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
     def largest_locked_in(self) -> float:
-        """Largest energy that may be locked in, so that the energy after td does not exceed the reference [energy]."""
+        """Largest energy to lock in such that the energy after td does not exceed the reference run's [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
 def compute_means(situation: Situation) -> Means | None:
-    """Compute the means of the flight; None on another basis than "energy", without a flight or energy, and at rest."""
+    """Compute the energies of the flight; None if the basis is not "energy", without flight or energy, and at rest."""
     if situation.basis != "energy":
         return None
     mean = compute_mean_in_flight(situation)
@@ -397,7 +397,7 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the motion after td; None on another basis than "energy", without a flight or energy.
+    """Estimate the motion after td; None if the basis is not "energy", or without a flight or energy.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
     """
@@ -422,7 +422,7 @@ def compute_mean_in_flight(situation: Situation) -> float | None:
 
 
 def compute_mean_decay(situation: Situation, time: Samples) -> float:
-    """Return the mean vibration energy at the times relative to that at td [-], from the damping of the flight."""
+    """Return the mean vibration energy at the times, relative to the energy at td [-], from the flight's damping."""
     exponents = -situation.flight.damping * (time - situation.td)
     return float(np.mean(np.exp(np.minimum(exponents, _LARGEST_EXPONENT))))
 
@@ -437,7 +437,7 @@ def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 
 
 def compute_shortfall(energy: Samples, mean: float) -> Samples:
-    """Return the shortfall of a locked-in amplitude from that of the largest vibration energy, 1 - sqrt(E/(2 <E>)) [-].
+    """Return by how much a locked-in amplitude falls short of the largest amplitude, 1 - sqrt(E/(2 <E>)) [-].
 
     It is infinite for larger energies, which must not be locked in.
 
@@ -468,12 +468,12 @@ def list_objections(
     tr: Samples,
     columns: Columns,
 ) -> Iterator[Objection]:
-    """Yield all objections to some of the candidates.
+    """Yield all objections that apply to at least one of the candidates.
 
     Parameters
     ----------
     situations : sequence
-        Situations of one record, by one set of rules.
+        Situations with the same record and rules.
     place : array of shape (n,)
         Index of the situation of each candidate.
     tr : array of shape (n,)
@@ -520,7 +520,7 @@ def list_objections(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # after its end the flight shows nothing about the time after td
+    # After the end of the flight, its energy says nothing about the time after td.
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
@@ -565,7 +565,7 @@ def _tell_against_td(
 def _tell_undescribed(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
-    """Return the objection that the vibration of a candidate is not described."""
+    """Return the objection that no model describes the vibration at a candidate."""
     return [situations[situation_of[candidate]].vibration.undescribed]
 
 
@@ -588,7 +588,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate keeps less of the vibration than a release without any."""
+    """Return the objection that a candidate keeps less of the vibration than a release without any vibration."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -614,7 +614,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """Describe that a switch is worse than a release without vibration, or than the best one at this td."""
+    """Describe that a switch is worse than a release without vibration, or than the best switch at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

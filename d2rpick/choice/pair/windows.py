@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-    # Test of times: returns True for each that keeps it.
+    # A test of times, which returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of bisections of the sampling interval at the end of a window: the end is exact to a millionth of it.
+# Number of bisections at the end of a window, which make the end accurate to 1e-6 of the sampling interval.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
 # Largest error of the polyline [-]: half of the last printed digit.
 _EXACT: Final = 5e-4
-# Number of bisections of an interval with a curved error.
-# A square root at zero energy is then exact to 1/4000, and a parabola is far more exact.
+# Number of times that an interval is halved if the error in it is curved. A square root at zero energy is then
+# accurate to 1/4000, and a parabola is far more accurate.
 _HALVINGS: Final = 20
 
 
@@ -38,8 +38,9 @@ def find_acceptable_windows(
 ) -> Samples:
     """Find the windows in which a tr is acceptable.
 
-    The rule of ``verify`` is applied to both ends and the middle of each window; the ends lie inside.  Between them the
-    rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
+    The rule of ``verify`` is applied to both ends and the middle of each window; the ends are acceptable too.  Between
+    them the verdict cannot change, because between neighbouring grid points the energy is linear or the deformation
+    monotone.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def find_acceptable_windows(
 
 
 def cut_before_td(situation: Situation, windows: Samples) -> Samples:
-    """Cut the windows one output interval before td, because a later tr saves nothing."""
+    """Cut off the windows one output interval before td, because a later tr saves nothing."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -85,7 +86,7 @@ def cut_before_td(situation: Situation, windows: Samples) -> Samples:
 def find_alike_windows(
     situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
 ) -> Samples:
-    """Find the acceptable windows in which the error of a tr is at most 0.05 above that of the chosen one.
+    """Find the acceptable windows in which the error of a tr is at most 0.05 larger than at the chosen tr.
 
     The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
     0.05.  On the energy alone the level error replaces that error.
@@ -141,11 +142,11 @@ def count_coverage(
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    # starts come before ends at the same time, since windows include their ends
+    # At equal times, starts are sorted before ends, since windows include their ends.
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # the gap between windows that start, or end, at the same time is empty
+    # Windows that start, or end, at the same time have no gap between them.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching
@@ -166,14 +167,14 @@ def find_common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Return times in the flight before td between which the rule changes at most once [time]."""
+    """Return times in the flight before td; between two of them the verdict changes at most once [time]."""
     history = situation.history
     td = situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # the energy exceeds the largest acceptable value between samples; stay just below it
+    # Between samples the energy may exceed the largest acceptable value, so crossings just below it are added.
     highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]
@@ -190,7 +191,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times: the error does not exceed ``level``, and the energy not the largest of the reference."""
+    """Return a test of times: neither the error exceeds ``level``, nor the energy its limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
@@ -202,12 +203,12 @@ def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
 
 
 def _make_rule(situation: Situation) -> Keeps:
-    """Return a test of times: the error is acceptable, and no limit of the settings is exceeded."""
+    """Return a test of times that requires an acceptable error and all limits of the settings."""
     has_small_error = _make_limit_on_error(situation, situation.most_error)
     has_limits = any(True for _ in situation.settings.limits)
 
     def keeps_rule(times: Samples) -> NDArray[np.bool_]:
-        # any tr before td is right at rest, unless td itself is wrong
+        # If nothing vibrates, any tr before td is acceptable unless td itself is wrong.
         keeps = (
             np.ones(times.shape, np.bool_)
             if situation.at_rest
@@ -221,7 +222,7 @@ def _make_rule(situation: Situation) -> Keeps:
 
 
 def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
-    """Return the windows in which a test is kept, shape (n, 2) [time]."""
+    """Return the windows in which times pass a test, shape (n, 2) [time]."""
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])
@@ -237,7 +238,7 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
 def make_error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Return the error of a tr in windows as points of a polyline, exact to 0.0005.
+    """Return the error of a tr in windows as the points of a polyline, accurate to 0.0005.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ def make_error_profile(
     -------
     array of shape (2, m)
         Times, ascending, and errors: the residual R, or on the energy alone the level error, as `Candidate.error` [-].
-        The polyline means nothing between two windows.
+        Between two windows the polyline has no meaning.
     """
     if not windows.size:
         return np.zeros((2, 0))
@@ -292,7 +293,7 @@ def _is_inside(times: Samples, windows: Samples) -> Samples:
 
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Thin out a curve: keep the ends of the windows, then add the point farthest from the line in each gap."""
+    """Thin out a curve: keep the ends of the windows, and in each gap add the point farthest from the straight line."""
     points = np.flatnonzero(np.isin(times, windows))
     while True:
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Ratio of the errors of CPU times, 5 %, and of the measured ratios of weights, 50 % [-].
+# Relative error of CPU times (5 %) over the relative error of the measured ratios of weights (50 %) [-].
 _DOUBT: Final = 0.1
-# The legs determine a weight if they contribute more than this share to it, with the errors above [-].
+# The legs determine a weight if they contribute more than this share to its value, given the errors above [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -61,7 +61,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """CPU time of one leg of a run per cycle [us], and the elements and nodes computed in the leg.
+    """The CPU time per cycle of one leg of a run [us], and the elements and nodes computed in the leg.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
@@ -76,7 +76,7 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """Fitted weights and the number of legs that determine each.
+    """The fitted weights, and for each the number of legs that determine it.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
     """
@@ -132,7 +132,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
 def _make_start_values(
     deformable: Sequence[Observation], classes: Sequence[str]
 ) -> Samples:
-    """Return start values: the measured weights in the unit of these runs, the rest per node, the rigid-node cost."""
+    """Return start values: weights in the unit of these runs, remaining cost per node, cost per rigid-body node."""
     measured = [
         sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
         for observation in deformable
@@ -364,7 +364,7 @@ def _make_observation(
 def _make_zone_observations(
     zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_RigidPart]
 ) -> Iterator[Observation]:
-    """Yield an observation for each set of rigid parts: the median over the states with this set."""
+    """Yield one observation for each set of rigid parts: the median over the states in which these parts are rigid."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
     for time, per_zone in zip(
@@ -385,7 +385,7 @@ def _make_zone_observations(
 def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Return the average number of deformable elements by class, with further points, and of rigid-body nodes."""
+    """Return the average numbers of deformable elements and further points by class, and of rigid-body nodes."""
     always = {
         part
         for part, data in inventory.parts.items()
@@ -422,7 +422,7 @@ def _add_counts(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add the elements of known cost by class, multiplied by ``times``."""
+    """Add the number of elements of known cost, multiplied by ``times``, to the counts by class."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

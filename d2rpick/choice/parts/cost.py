@@ -27,30 +27,31 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost per element and cycle [us] of shells with one integration point, and of each further point.
-# Fitted to runs of a car of 1516 elements after its first impact, with and without rigid parts.
-# The runs had shells in one formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).
-# Costs of beams and springs are not well separated.
+# Cost of an element per cycle [us]: for shells with one integration point, and "point" for each further one.
+# The costs were fitted to runs of a car with 1516 elements after its first impact, with and without rigid parts.
+# All shells of a run had the same formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).
+# The fit does not separate the costs of beams and springs well.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Share of the elements in a deformable step: 0.88, plus 0.03 to 0.04 for their assembly, contact and output [-].
+# Share of the elements in the cost of a deformable step [-]: 0.88 for the elements themselves,
+# plus 0.03 to 0.04 for their assembly, contact and output.
 ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs.
 RIGID_NODE: Final = 0.04
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
-# Costs must be smaller, so that sums over all elements stay finite; real costs are far smaller in any unit.
+# Upper limit of a cost, so that sums over all elements stay finite. Real costs are far smaller in any unit.
 _LARGEST: Final = 1e100
 
-# Keys of the TOML file of weights that ``d2rpick calibrate`` writes.
+# Keys with a number in the TOML file of weights that ``d2rpick calibrate`` writes.
 _NUMBERS: Final = ("element_share", "rigid_node")
 _KEYS: Final = (*_NUMBERS, "per_element", "source")
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Costs of an element per cycle by formulation or class, and of a rigid-body node; share of elements in a step.
+    """Cost of an element per cycle by formulation or class, cost of a rigid-body node, and share of elements in a step.
 
     Only ratios count: all costs have the unit of ``per_element``.  ``file`` is the file that the weights were read
     from, None if they were not read.
@@ -63,7 +64,7 @@ class Weights:
     file: Source | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError naming a number outside of its range."""
+        """Raise ConfigurationError if a number is outside of its range."""
         for name, value in self.per_element.items():
             _check_weight(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
@@ -88,7 +89,7 @@ def _check_weight(name: str, value: float) -> None:
 def compute_saved_share(
     weights: Weights, total: float, rigid: float, nodes: int
 ) -> float:
-    """Return the share c of a step that is saved while elements of the cost ``rigid`` are rigid, at least 0 [-].
+    """Return the share c of a step's cost that is saved while elements with a total cost of ``rigid`` are rigid [-].
 
     Parameters
     ----------
@@ -111,28 +112,28 @@ def compute_saved_share(
 
 
 class Amount(NamedTuple):
-    """Cost of a set of elements in the unit of the weights, and its formulations without a weight."""
+    """Cost of a set of elements in the unit of the weights, and the formulations in it that have no weight."""
 
     cost: float
     unknown: tuple[str, ...] = ()
 
 
 class Share(NamedTuple):
-    """Share of a step that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
+    """Share of a step's cost that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
 
     value: float | None
     reason: str | None = None
 
 
 class ByDeck(NamedTuple):
-    """Sources of the values from a deck: its files, and the weights, None if the cost share was given."""
+    """Sources of the values from a deck: its files, and the weights (None if the cost share was given)."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
 
 
 class CostModel:
-    """Cost of the elements of a deck by weights; elements that are rigid from the start cost nothing."""
+    """Model of the cost of a deck's elements. Elements that are rigid from the start cost nothing."""
 
     def __init__(self, inventory: Inventory, weights: Weights | None = None) -> None:
         self.inventory = inventory
@@ -161,7 +162,7 @@ class CostModel:
         )
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Return the share c of a step saved while ``parts`` are rigid [-]; unknown for parts not in the deck."""
+        """Return the share c of a step's cost saved while ``parts`` are rigid [-]; unknown if the deck lacks a part."""
         absent = sorted(set(parts) - self.inventory.parts.keys())
         if absent:
             return Share(
@@ -179,7 +180,7 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Formulations of the deck that have the weight of a similar formulation."""
+        """The formulations of the deck for which the weight of a similar formulation is assumed."""
         names: dict[str, None] = {}
         for part, counts in self.inventory.counts.items():
             if part in self._rigid:
@@ -240,7 +241,7 @@ def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
 
 
 def read_weights(path: str) -> Weights:
-    """Read weights from a TOML file; a missing element share or node cost has its measured value.
+    """Read weights from a TOML file. A missing element share or node cost gets its measured value.
 
     Raises
     ------
@@ -322,5 +323,5 @@ def _parse_weight(path: str, name: str, value: object) -> float:
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:
         return float(value)
-    except OverflowError:  # an integer with hundreds of digits
+    except OverflowError:  # The integer has hundreds of digits.
         return float("inf")

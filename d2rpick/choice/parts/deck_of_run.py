@@ -1,6 +1,6 @@
 """Apply the deck of a run: rigid bodies, supports, gravity and costs, and doubts about the deck.
 
-The part ids of a deck of another model have nothing to do with the run, so nothing of it is used.
+If the deck belongs to another model, its part ids do not match the run, so nothing from it is used.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
     """Return the single rigid body of merged parts, regardless of the ``bodies`` they would become."""
-    # a single part may consist of pieces
+    # A single part may consist of disconnected pieces.
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
@@ -66,8 +66,8 @@ def merge_into_one_body(
 def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
     """Return a warning if a deck does not belong to a run, otherwise None.
 
-    It is not if more titles of the parts in both differ than agree, or if the whole deck was read and lacks parts that
-    have energy.
+    A deck does not belong to a run if most titles of their common parts differ, or if the deck was read completely and
+    lacks parts that have energy.
     """
     titled = [
         part
@@ -117,7 +117,7 @@ def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[C
 def warn_about_bodies(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings if unread ties may join the bodies of ``parts``, or a body has loose pieces."""
+    """Yield warnings if ties that were not read may join the bodies of ``parts``, or a body has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
             more_ties = f" and {len(inventory.ties) - 1} more ties"
@@ -171,7 +171,7 @@ def warn_about_solver(
 
 
 def warn_about_left_rigid(run: OpenedRun, inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if a deck keeps parts rigid that deform in the history."""
+    """Yield a warning if parts that deform in the history are rigid in the deck."""
     left_rigid = inventory.left_rigid
     if left_rigid and _has_energy(
         run, [part for part in run.parts if part.id in left_rigid.parts]
@@ -206,7 +206,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 
 
 def _is_different_title(first_title: str, second_title: str) -> bool:
-    """Return True if two titles differ, ignoring spaces, case, and the length of a truncated one.
+    """Return True if two titles differ, ignoring spaces and case; one of them may be truncated.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
@@ -304,14 +304,14 @@ def _group_connected_parts(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
 
 
 def _make_supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
-    """Return the supports with their names and times, each once."""
+    """Return the supports with their names and times, without duplicates."""
     return tuple(
         dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
     )
 
 
 def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield the possible accelerations of gravity for each part for which they are known."""
+    """Yield each part with known gravity, and the accelerations that gravity may have for it."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
         acting = [(load, _is_gravity_on(load, part, nodes)) for load in loads or ()]

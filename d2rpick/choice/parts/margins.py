@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
 
-# Number of times in a flight at which a body is tried as frozen: its inner motion is slow.
+# Freezing a body is tried at this many times in a flight, which suffices because its internal motion is slow.
 _TIMES: Final = 100
 
 
@@ -41,7 +41,7 @@ def _compute_drift(
     placement: Placement | None,
 ) -> Bodies:
     """Return the drift of the rigid bodies of the parts in a flight."""
-    # imported here: a table has no parts
+    # Imported here to keep start-up fast.
     from d2rpick.flight.position_error import (
         find_bodies_in_flight,
     )
@@ -50,7 +50,7 @@ def _compute_drift(
 
 
 def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
-    """Return the given margin, or the time by which switching in the flight may make the contact come earlier."""
+    """Return the given margin, or the time by which a switch in the flight may make the contact earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
     bodies = find_drift_of_bodies(history, flight, settings)
@@ -62,7 +62,7 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
 
 
 def compute_turning_speed(history: History, flight: Flight, bodies: Bodies) -> float:
-    """Return what the rotation of the bodies adds to their speed towards a contact where they touch [length/time].
+    """Return the speed that the rotation of the bodies adds at the points where they touch a contact [length/time].
 
     0 if the momenta do not show a direction, or no deck shows how the bodies turn.
     """

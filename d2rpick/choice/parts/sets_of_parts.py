@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Savings that differ by less are equal [-]: the cost model is right to within a few percent of the run time.
+# Savings that differ by less than this are treated as equal [-]; the cost model has errors of a few percent.
 _LIKE: Final = 0.01
 # The set "heavy" has at least this share of the mass of all switchable parts [-].
 _HEAVY: Final = 0.5
@@ -109,7 +109,7 @@ class PartSet(NamedTuple):
 
 @dataclass(frozen=True)
 class Parts:
-    """Answer of ``parts``: all parts, sets of them, and warnings.
+    """The answer of ``parts``: all parts, sets of parts, and warnings.
 
     ``inventory`` is None without a deck.
     """
@@ -154,7 +154,7 @@ def compare_sets_of_parts(
         tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, and for each set
         the tr of ``suggest``.
     deck_files : sequence of str
-        The deck, in whose folder a d3hsp with the smallest time steps of parts is looked for too.
+        Files of the deck; a d3hsp in the same folder gives the smallest time steps of the parts.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def compare_sets_of_parts(
     comparison = _SetComparison(run, settings, model, rows)
     sets: list[PartSet] = []
     for part_set in _list_sets(rows, given_ids):
-        # the same td for all sets, so that they can be compared
+        # All sets get the same td, so that they can be compared.
         td = next((earlier.window[1] for earlier in sets if earlier.window), None)
         sets.append(comparison.of(part_set, times or td))
         if part_set.name == _ALL:
@@ -179,7 +179,7 @@ def compare_sets_of_parts(
             )
         else:
             still_parts = ()
-        # the other parts may fly longer than the moving ones
+        # The other parts may fly longer than the moving parts.
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
     recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))
@@ -241,7 +241,7 @@ def recommend_parts(
 
 
 def _drop_repeated_sets(sets: Sequence[PartSet]) -> list[PartSet]:
-    """Leave out sets that repeat the parts of an earlier set under another name."""
+    """Omit each set that has the same parts as an earlier set under another name."""
     return [
         part_set
         for at, part_set in enumerate(sets)
@@ -284,7 +284,7 @@ def _select_heavy(movable: Sequence[PartRow]) -> list[PartRow]:
 
 @dataclass(frozen=True)
 class _SetComparison:
-    """The run, settings, costs and parts with which all sets are compared."""
+    """The run, settings, costs and parts that the comparison of all sets shares."""
 
     run: OpenedRun
     settings: Settings
@@ -297,7 +297,7 @@ class _SetComparison:
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set with its costs and errors, for a given (tr, td) or td, or for its own best td."""
+        """Complete a set with its costs and errors, for a given (tr, td) or td, or else for the best td of the set."""
         reasons = list[str | None]()
         if self.model:
             share = self.model.saved(part_set.parts)
@@ -400,7 +400,7 @@ class _SetComparison:
 
 
 def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
-    """Add the largest position error at td of a body whose parts moved relative to each other before tr."""
+    """Add the largest position error at td among the bodies whose parts move relative to each other."""
     codes = ("several-bodies", "moves-apart")
     reasons = tuple(
         caution.message
@@ -430,7 +430,7 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
 
 
 def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Mark the recommended set: the largest saving, and of equal savings the fewest parts.
+    """Mark the recommended set, which has the largest saving or, if several sets save as much, the fewest parts.
 
     A set with too large a position error is considered only if all sets have one.
     """

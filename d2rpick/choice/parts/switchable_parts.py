@@ -1,4 +1,4 @@
-"""Judge which parts may be switched, by the data of deck and history, with reasons."""
+"""Judge which parts may be switched, with reasons, from the data of deck and history."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A part has stopped deforming if its energy in flight scatters by less than this share of the mean [-].
-# Most of the energy is then plastic work, and the vibration a small part of it.
+# A part has stopped deforming if the standard deviation of its energy in flight is below this share of the mean [-].
+# Most of its energy is then plastic work, and only a small part is vibration energy.
 STOPPED: Final = 0.1
 # Duration of the first phase of a landing, as a share of the flight before it [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part takes the landing alone if it absorbs at least this share of the energy at first.
-# It must have at most the second share of the cost, so that it may stay deformable [-], such as a bumper or a skid.
+# A part takes the landing alone, as a bumper or a skid does, if it absorbs at least this share of the energy at
+# first [-], and has at most the other share of the cost [-], so that it may stay deformable.
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
 
 class InFlight(NamedTuple):
-    """One part in one flight; energies are None if the part has none or they are not written.
+    """Data of one part in one flight; energies are None if they are not written or the part has none.
 
     ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
     minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
@@ -111,7 +111,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # raised if no part ever deforms
+    except FormatError as error:  # The error is raised if no part ever deforms.
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -268,13 +268,13 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; mass and time step ``by_deck`` are used if no better values are known."""
+    """Collect the data of a part. Mass and time step from the deck (``by_deck``) are used without better values."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
-        counts = None  # the elements may be in a file that was not read
+        counts = None  # The elements may be in a file that was not read.
     if by_deck[1] is None:
         step, source = printed.get(part, (None, None))
     else:
@@ -315,7 +315,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the kind of a part: that of its material, or "spring" or "particles" by its elements."""
+    """Return the kind of a part: the kind of its material, or "spring" or "particles" if its elements are such."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:
@@ -409,7 +409,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
 def _list_unknowns(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
-    """Yield the data that are missing to judge a part without objections."""
+    """Yield the missing data without which a part cannot be judged, although nothing speaks against switching it."""
     if inventory is None:
         yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:
@@ -485,7 +485,7 @@ def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merge_rows(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Merge connected parts into one rigid body: the first id is the lead part, the others are merged with it."""
+    """Merge connected parts into one rigid body. The part with the first id is the lead part."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

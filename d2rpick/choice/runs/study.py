@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# Status of a run; runs with one of the first two were judged.
+# Status of a run. Runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -54,17 +54,17 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "out-of-range",
     "failed",
 )
-# Tukey's fences lie at this multiple of the interquartile range beyond the quartiles [-].
+# Distance of Tukey's fences from the quartiles, in interquartile ranges [-].
 _FENCE: Final = 1.5
 # Largest number of runs named in a sentence.
 NAMED: Final = 3
-# Share of the rigid time that may be given up for a number with fewer digits [-].
+# Share of the rigid time that may be given up to get a tr with fewer digits [-].
 _ROUNDED: Final = 0.001
-# Codes of warnings of single runs that are not repeated: the row shows them, or they do not concern the study.
+# Codes of warnings about single runs that a study does not repeat, because the row of the run shows them.
 _NOT_REPEATED = ("no-candidate",)
-# A record that ends before this share of the median end time was cut off [-], as variants end together.
+# A record that ends before this share of the median end time was cut off [-], since variants have equal end times.
 _WHOLE: Final = 0.99
-# Number of pieces of a drawn curve, each with its lowest and highest energy: twice as many as are visible.
+# Number of pieces of a drawn curve, each with its lowest and highest energy. It is twice what is visible.
 _STRETCHES = 200
 
 
@@ -73,7 +73,7 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """The question for every run: ``td``, a window for it, or None for the longest flight.
+    """The question that every run is asked: ``td`` is a time, a window for td, or None for the longest flight.
 
     With ``curve`` an outline of the energy is kept for drawing.
     """
@@ -96,7 +96,7 @@ class Stamp(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StudyRow:
-    """Answer for one run; times in the unit of its history, None for unknown values.
+    """The answer for one run, with times in the unit of its history; unknown values are None.
 
     ``status`` is "ok"; "none": nothing can be recommended; "unreadable"; "out-of-range": the record does not reach td
     or is too short; "failed": its process died; "internal-error": the program failed.  ``message`` gives the reason for
@@ -136,7 +136,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs with its shared window [time]; otherwise None and the reason.
+    """One tr for all judged runs, with the window that all share [time]; None with the reason if there is no such tr.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors of the runs at this tr, in their order: residuals, or
@@ -151,7 +151,7 @@ class Common(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Smallest, median and largest tr of the runs that have one [time]."""
+    """Smallest, median and largest tr of the runs for which a tr is recommended [time]."""
 
     min: float
     median: float
@@ -160,7 +160,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyOfRuns:
-    """Answer of ``study``; ``agree``: the intervals of tr intersect, None without any tr.
+    """The answer of ``study``; ``agree`` is True if the intervals of tr intersect, None without any tr.
 
     ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
     """
@@ -180,14 +180,14 @@ class StudyOfRuns:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: that of the worst run, by its pair and by its error at this tr; None without a tr."""
+        """Grade of the common tr: the worst grade of runs' pairs and of their errors at this tr; else None."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
         for row, error in zip(self.runs, self.common.errors, strict=True):
             if error is None or row.residual is None or row.basis == "energy":
                 continue
-            # its own pair may have a better grade than its residual, if the error hardly matters
+            # The run's own pair may have a better grade than its residual suggests, if the error hardly matters.
             at_common_tr = grade_residual(error)
             if GRADES.index(at_common_tr) < GRADES.index(grade_residual(row.residual)):
                 grades.append(at_common_tr)
@@ -200,7 +200,7 @@ class StudyOfRuns:
 
 
 def judge_run(question: Question, source: str) -> StudyRow:
-    """Read and judge one run; errors of the run are reported in its row.
+    """Read and judge one run. Errors of the run are reported in its row.
 
     Raises
     ------
@@ -291,12 +291,12 @@ def make_failed_row(source: str, error: BaseException) -> StudyRow:
 
 
 def stamp_files(source: str) -> tuple[Stamp, ...]:
-    """Return the present size and modification time of the files of a run, by absolute name; empty without files."""
+    """Return the current size and modification time of each file of a run, by absolute name; empty without files."""
     try:
         states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
         ]
-    except (D2RPickError, OSError):  # the reader of the run reports it
+    except (D2RPickError, OSError):  # The error is reported when the run is read.
         return ()
     return tuple(
         Stamp(path, state.st_size, state.st_mtime_ns) for path, state in states
@@ -324,7 +324,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs and the interval within the accuracy of each (low > high: none)."""
+    """Return the tr of all runs, and the interval that lies within the accuracy of each tr (empty if low > high)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
@@ -332,7 +332,7 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 
 
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
-    """Return the runs that were cut off: files that end within a state, or records shorter than most."""
+    """Return the runs that were cut off: their files end within a state, or their records are shorter than most."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
     return [
@@ -343,7 +343,7 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 
 
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
-    """Yield warnings about runs left out, runs that differ in kind, and warnings of single runs."""
+    """Yield warnings about omitted runs and runs of different kinds, and the warnings of single runs."""
     judged = [row for row in rows if row.judged]
     left_out = [row.source for row in rows if not row.judged]
     if left_out and judged:
@@ -394,11 +394,11 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
 
 
 def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
-    """Choose one tr for all judged runs: their own if they agree, otherwise the earliest similar for all.
+    """Choose one tr for all judged runs: the median if their tr agree, otherwise the earliest tr that suits all runs.
 
-    "Alike" keeps the timing tolerance of every run.  If none does, choose the earliest tr acceptable in all runs at
-    which the largest loss of a run is hardly larger than necessary.  Unless the runs agree, the tr has few digits; that
-    costs at most 1/1000 of the rigid time.
+    A tr suits all runs if it keeps the timing tolerance of every run.  If no tr does, choose the earliest tr that is
+    acceptable in all runs and at which the largest loss of a run is hardly larger than necessary.  Unless the runs
+    agree, the tr has few digits, which costs at most 1/1000 of the rigid time.
     """
     judged = [row for row in rows if row.judged]
     if not judged:
@@ -432,7 +432,7 @@ def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | Non
 def _find_least_loss(
     judged: Sequence[StudyRow], shared: Samples
 ) -> tuple[float, float]:
-    """Return the first interval of the shared windows in which no run loses 0.02 more than the smallest loss."""
+    """Return the first interval of the shared windows in which the largest loss is at most 0.02 above its minimum."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
@@ -451,7 +451,7 @@ def _find_least_loss(
 
 
 def find_fewest_digits(low: float, high: float) -> float:
-    """Return a number with the fewest digits between ``low`` and ``high``: 0, or the one nearest to their middle.
+    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to their middle.
 
     Examples
     --------
@@ -471,7 +471,7 @@ def format_number_of_runs(number: int) -> str:
 
 
 def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
-    """State which tr is acceptable in most runs, and in which runs it is not."""
+    """Describe which tr is acceptable in most runs, and in which runs it is not."""
     stretches, counts = count_coverage([row.acceptable for row in judged])
     if not counts.size:
         if len(judged) > 1:
@@ -494,7 +494,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 
 
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the outliers: judged runs without a tr, then those with a tr beyond Tukey's fences.
+    """Return the outliers: judged runs without a tr, then runs whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.
     """

@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest deviation of the momentum after td, as a share of the momentum; beyond it the motion is different [-].
+# The motion after td is different if the momentum deviates by more than this share of the momentum [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Momenta below this share of the largest one are replaced by it: a resting body cannot deviate much [-].
+# Smallest reference for a relative deviation, as a share of the largest momentum [-]; a body may be at rest.
 _AT_REST = 0.01
-# A larger difference between energies while rigid and at td gets a note [-], if it also exceeds the usual change
-# between states. Some solvers report a wrong energy for rigid solid elements.
+# If the energies while rigid and at td differ by more than this share [-], and by more than energies usually change
+# between states, a note says so. Some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# Largest change of a constant energy, as a share of the energy and of the vibration [-].
-# The energy of a rigid body is constant to its digits; that of a vibrating one changes more between states.
-# If most of the energy is plastic work, the vibration is a small part of it, hence the second share.
+# An energy is treated as constant if it changes by less than the first share of the energy
+# and the second share of the vibration [-]. The energy of a rigid body is constant to its printed digits,
+# whereas vibration changes it more between states; but the vibration may be small against plastic work.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# Tolerance for the energy near tr, as a share of it [-]: a solver switches at the first step after tr,
-# and output may miss that by a state or two.
+# Relative tolerance for the energy near tr [-]: a solver switches at the first step after tr,
+# which may be a state or two away from the nearest output.
 _ABOUT = 0.05
-# Number of times between two states at which the switch to rigid is searched.
+# Number of times between two states at which the switch to rigid is searched for.
 _BETWEEN: Final = 101
 
 
@@ -82,7 +82,7 @@ def compare_with_reference(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a finished switched run with its reference run, by the parts that are in both.
+    """Compare a finished switched run with its reference run, using the parts that both contain.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
     ``compare_runs``.
@@ -122,7 +122,7 @@ def compare_with_reference(
 
 
 def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:
-    """Return the momentum of some parts; None if the run lacks one of them or their momenta."""
+    """Return the momentum of some parts; None if the run lacks one of these parts or its momentum."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 
@@ -178,7 +178,7 @@ def compare_runs(
         and _is_reported_wrong(energies_before[-1], energies_to_end[1:])
     ):
         energies_after = energies_after[1:]
-        # the switch comes at the first step from td on, so this state was still rigid
+        # The solver switches at the first step from td on, so the parts were still rigid in this state.
         energies_to_end = energies_to_end[1:]
     frozen = float(energies_after[0])
     energy_td = reference.energy_at(td)
@@ -248,7 +248,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the largest change of a constant energy [energy]: a share of the vibration, or digits."""
+    """Return the change up to which an energy is constant [energy]: a share of the vibration, or its rounding error."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -342,7 +342,7 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: the window in which only its energy is constant.
+    """Find tr and td of a switched run: in this window its energy is constant, but not that of the reference run.
 
     Returns
     -------
@@ -359,7 +359,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     rounding = round_off(reference)
-    # round-off energies of rigid or resting parts change during a fall
+    # Energies that are only round-off, as of rigid or resting parts, change during a fall.
     unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
     still = find_stretches(np.append(False, unchanged), FEWEST)
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]
@@ -389,7 +389,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
 def _explain_why_no_times(
     switched: History, reference: History, spans: Sequence[tuple[int, int]]
 ) -> str:
-    """Explain why no rigid window is found; ``spans`` are the first and last states of constant energy."""
+    """Explain why no rigid window is found; ``spans`` has the first and last states of each constant energy."""
     if np.array_equal(switched.time, reference.time) and np.array_equal(
         switched.energy, reference.energy
     ):
@@ -413,7 +413,7 @@ def _is_reported_wrong(rigid: float, energies_after: Samples) -> bool:
 def _compute_relative_distance(
     reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
-    """Return the largest distance between two tracks over the largest size of the reference track [-]."""
+    """Return the largest distance between two tracks, relative to the largest vector of the reference track [-]."""
     distance = _compute_distance(reference, switched, td, end)
     if reference is None or distance is None:
         return None

@@ -1,8 +1,8 @@
 """Analyse a switched run: when its parts were rigid, which parts can be compared, and how its landings moved.
 
-While solids are rigid, some solvers report a sum of energy densities for them, and some continue with it.  A frozen
-deformation does not change, so a part that is deformable again has its energy of tr.  If the energy is off by more than
-the part's largest energy in the reference run, it is reported wrongly, and the part is left out.
+While solids are rigid, some solvers report a sum of energy densities for them, and some do so even afterwards.  A
+frozen deformation does not change, so a part that is deformable again should have its energy of tr.  If the energy
+differs by more than the part's largest energy in the reference run, it is reported wrongly, and the part is ignored.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Evidence that locates the start of a flight within a few states; the energy alone is less exact.
+# Kinds of evidence that locate the start of a flight within a few states. The energy alone is less accurate.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# The model moves but its parts do not, if they have less than this share of its momentum [-].
+# The parts are treated as not moving if they carry less than this share of the momentum of the model [-].
 _HARDLY: Final = 0.1
-# Fewest consecutive states without kinetic energy, or with constant internal energy, that show a rigid part.
+# A part was rigid if it has no kinetic energy, or constant internal energy, in this many consecutive states.
 FEWEST: Final = 12
 # Relative change below which an internal energy is constant: solvers write single precision [-].
 SAME: Final = 1e-6
@@ -50,7 +50,7 @@ _SAME_STATES: Final = 3
 
 
 class DoneWindow(NamedTuple):
-    """A window in which a run was switched, with the flight around it, its landing and the planned landing.
+    """A window in which a run was switched, with the flight around it, the actual and the planned landing.
 
     ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
     interval, below which both are equal [time].
@@ -70,7 +70,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def took_off(self) -> float | None:
-        """End of a contact in which the parts were rigid from tr on [time]; None if the flight began before tr."""
+        """End of the contact during which the parts became rigid [time]; None if the flight began before tr."""
         if (
             self.flight is None
             or self.flight.start is None
@@ -95,7 +95,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def description(self) -> str:
-        """Sentence for the user on what became of the window."""
+        """A sentence about the outcome of the window, for the user."""
         if self.flight is None:
             return "no flight is found there"
         if self.took_off is not None:
@@ -132,11 +132,11 @@ def prepare_switched_history(
     Returns
     -------
     history : History
-        Without the momenta of parts if a rigid body had replaced these.
+        Without part momenta if rigid bodies had replaced the parts.
     windows : tuple of (float, float)
         Windows that are done: ``done``, and others in which all requested parts were rigid [time].
     cautions : tuple of Caution
-        Windows recognised beyond ``done``, and parts that were not rigid in ``done``.
+        Warnings about further rigid windows, and about parts that were not rigid in ``done``.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def prepare_switched_history(
 def select_model_momenta(history: History) -> History:
     """Return a history without part momenta, as rigid bodies have replaced parts.
 
-    Energies of rigid solids are meaningless, so only the momentum of the model shows whether it flies.
+    Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies.
     """
     whole = tuple(
         replace(momenta, flying=momenta.chosen)
@@ -225,7 +225,7 @@ def find_done_windows(
     windows: Sequence[Times],
     planned: Sequence[Flight] | None,
 ) -> tuple[DoneWindow, ...]:
-    """Find when the flights of done windows landed, and when they were planned to land."""
+    """Find when the flights with completed windows landed, and when they were planned to land."""
     done = []
     for tr, td in windows:
         flight = _find_flight_around(history, flights, tr, td)
@@ -259,7 +259,7 @@ def _find_flight_around(
 def _warn_about_deforming(
     reference: Reference, tr: float, td: float
 ) -> Iterator[Caution]:
-    """Yield a warning with the requested parts that deform in a window.
+    """Yield a warning that names the requested parts that deform in a window.
 
     Raises
     ------
@@ -285,7 +285,7 @@ def _warn_about_deforming(
             )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
-        return  # parts without internal energy may also be in free fall
+        return  # Parts without internal energy may be in free fall rather than rigid.
     where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
     raise RangeError(
         f"{where}, a window that `done` names; give the run that was switched in it"
@@ -368,7 +368,7 @@ def detect_rigid_parts(
     ``time`` has the times of the parts' states, shape (n,).
     """
     inside = find_window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    # the switch comes at the first step after tr
+    # The solver switches at the first step after tr.
     inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))
     if not parts or len(time[inside]) < FEWEST:
         return None
@@ -383,7 +383,7 @@ def detect_rigid_parts(
 
 
 class SameParts(NamedTuple):
-    """Energies of the same parts in both runs, with objections and notes about other parts.
+    """Energies of the same parts in both runs, with objections and notes about the other parts.
 
     ``is_reported`` is False if the energies of all parts are reported wrongly.
     """
@@ -418,7 +418,7 @@ def choose_same_parts(
         return (
             _choose_compared_parts(without, switched, pair, parts) if parts else as_read
         )
-    except FormatError:  # a quantity of the parts is missing in some states
+    except FormatError:  # A quantity of the parts is missing in some states.
         return as_read
 
 
@@ -475,10 +475,10 @@ def _choose_compared_parts(
 def _find_misreported(
     without: Reference, switched: OpenedRun, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Return the parts with an energy after td that differs from that at tr by more than is possible."""
+    """Return the parts whose energies after td and at tr differ by more than is possible."""
     time = switched.part_time
     energies = switched.part_energies(parts)
-    # the first state from td on may still be rigid
+    # In the first state from td on the parts may still be rigid.
     first = int(np.searchsorted(time, pair[1])) + 1
     last = int(np.searchsorted(time, pair[0], side="right")) - 1
     if last < 0 or first >= time.size:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
-# Positions in the record at which a vibration without contacts is searched, as shares of its length [-].
+# A vibration without contacts is searched for at these times, as shares of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-# Shorter rigid windows, as a share of the record, save less than a restart costs [-].
+# Rigid windows below this share of the record are left out [-], since they save less than a restart costs.
 MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
@@ -32,8 +32,8 @@ def find_longest_flight(
 ) -> tuple[float, float]:
     """Return the longest flight as a window for td within the record [time].
 
-    A td in a flight known by the energy alone may show another end of the flight; then the window keeps the margin.
-    ``otherwise`` is returned if there is no flight.
+    If only the energy shows the flight, its end may differ from td to td; then the window keeps the margin.  Without a
+    flight, ``otherwise`` is returned.
 
     Raises
     ------
@@ -74,12 +74,12 @@ def compute_last_td(end: float, margin: float) -> float:
 
 
 def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
-    """Find all flights of a record, ascending in time; the flight of a given landing ends there.
+    """Find all flights of a record in time order; the flight that ends with a given landing ends at that time.
 
     Parameters
     ----------
     history : History
-        With its evidence, as a run provides it.
+        With the evidence of its run.
     settings : Settings
         Options for the search for an oscillator if no better evidence shows a flight.
 
@@ -171,7 +171,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 def _find_flights_without_landing(
     history: History, settings: Settings
 ) -> tuple[Flight, ...]:
-    """Find the flights by evidence, otherwise by an oscillator or modes, otherwise by quiet times."""
+    """Find the flights from the evidence, or else from an oscillator or modes, or else from quiet times."""
     witnessed = find_all_seen(history)
     if witnessed:
         return tuple(
@@ -185,7 +185,7 @@ def _find_flights_without_landing(
             )
             for source, window in witnessed
         )
-    # imported here: better evidence than the energy does not need it
+    # Imported here to keep start-up fast.
     from d2rpick.choice.pair.situation import (
         make_look,
     )
@@ -197,17 +197,17 @@ def _find_flights_without_landing(
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # this flight ends with the vibration, also if its start is given
+                # This flight ends with the vibration, even if its start is given.
                 return (flight,)
         look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
-    # the last quiet time before td covers most of the flight
+    # The quiet time around the latest td covers most of the flight.
     for td in sorted(list_moments(history.time), reverse=True):
         if flights and flights[-1].start is not None and td > flights[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
-        # a flight that reaches the next one misses the load between them, so its end is unknown
+        # If a flight reaches the next one, the load between them was missed, so the end of the flight is unknown.
         lasts = (
             flights
             and flight.within(history.time)[1] > flights[-1].within(history.time)[0]
@@ -218,14 +218,14 @@ def _find_flights_without_landing(
 
 
 def list_momentum_columns(history: History) -> dict[str, Samples]:
-    """Return columns of the momentum that shows the flight, and of the mass.
+    """Return the columns of the momentum that shows the flight, and of the mass.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
     are columns of the velocity.  The result is empty if neither is written at the times of the energy.
     """
     import numpy as np
 
-    # imported here: most evidence does not need it
+    # Imported here to keep start-up fast.
     from d2rpick.flight.momentum import (
         find_all_flights,
         select_momenta_for_flight,

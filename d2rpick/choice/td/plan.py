@@ -1,11 +1,11 @@
-"""Plan the rigid windows of a run: the times for each flight, and the windows supported by this reference run.
+"""Plan the rigid windows of a run: the times for each flight, and which windows this reference run supports.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
-moves the next landing by a little, for which the margin is kept, and later landings by more than any margin.  So one
-reference run supports all windows up to the first that locks in energy, including it.  Later windows are planned from
-the run switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
+moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
+run supports all windows up to and including the first that locks in energy.  Later windows are planned from the
+run that is switched in these windows (docs/explanation/planning.md, "Why you cannot use all windows of one run").
 
-Each window that locks in energy costs another run, so a short one is left out for a longer one after it.
+Each window that locks in energy requires another run, so a short window is left out in favour of a longer later one.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# A window is left out for a later one that is longer by more than this factor [-].
-# With the windows w and W one after the other, the next run saves w, and the run after it w + W.
-# The other window alone saves W in both runs, which is more if W > 2 w.
+# A window is left out if a later window is longer by more than this factor [-].
+# With both windows, of lengths w and W, the next run saves w and the run after it w + W.
+# With only the later window both runs save W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
 
 
 class PlannedFlight(NamedTuple):
-    """One flight of a run and the rigid window in it; times in the unit of the history.
+    """One flight of a run and the rigid window in it, with times in the unit of the history.
 
     ``status`` is "supported" by this reference run, "re-plan" from a switched run, "done", or "left-out"; ``reason``
     explains all but the first.  ``answer`` is the suggestion for this flight, None if there is none.  ``done``
@@ -84,7 +84,7 @@ class PlannedFlight(NamedTuple):
 
     @property
     def rigid_fraction(self) -> float | None:
-        """Share of the record in which the parts are rigid by this window [-]; None without one."""
+        """Share of the record in which the parts are rigid because of this window [-]; None without a window."""
         return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
@@ -106,7 +106,7 @@ class PlannedFlight(NamedTuple):
     def locks_in(self) -> bool | None:
         """True if the window locks in energy, so that later landings move; None without a window.
 
-        It locks in none if the energy is constant except for round-off, as in a free fall from rest.
+        It locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
         """
         if self.answer is None or self.window is None:
             return None
@@ -117,7 +117,7 @@ class PlannedFlight(NamedTuple):
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Answer of ``plan``: all flights in time order, and warnings.
+    """The answer of ``plan``: all flights in time order, and warnings.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
     """
@@ -150,9 +150,9 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """(tr, td) of the next run: the done and the supported windows; empty without new ones [time].
+        """(tr, td) of all windows of the next run, done and supported [time]; empty if no window is new.
 
-        The next run starts again from the beginning, so it needs both.
+        The next run starts again from the beginning, so it needs both kinds.
         """
         return (*self.done, *self.windows) if self.windows else ()
 
@@ -163,12 +163,12 @@ class RunPlan:
 
     @property
     def rigid_fraction(self) -> float:
-        """Share of the record in which the parts are rigid by the supported windows [-]."""
+        """Share of the record in which the parts are rigid because of the supported windows [-]."""
         return self.rigid_time / float(self.history.time[-1] - self.history.time[0])
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the supported windows over that of the reference [-]; None without a cost share."""
+        """Expected run time with the supported windows, relative to the reference [-]; None without a cost share."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -212,7 +212,7 @@ def plan_run(
     history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
     flights = find_flights(history, settings)
-    # the earlier run may have been switched itself
+    # The earlier run may itself be a switched run.
     earlier = before and find_flights(prepare_switched_history(before, ())[0], settings)
     done_rows = find_done_windows(history, flights, done_times, earlier)
     judged: Iterable[PlannedFlight] = _list_rows(
@@ -236,7 +236,7 @@ def _list_rows(
     shortest: float,
     done_rows: Sequence[DoneWindow],
 ) -> Iterator[PlannedFlight]:
-    """Yield every flight with its window, planned as if it were the first."""
+    """Yield every flight with its window, which is planned as if it were the first window."""
     last = max((done.td for done in done_rows), default=None)
     record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # end of the previous flight
@@ -269,7 +269,7 @@ def _list_rows(
 def _apply_given_start(
     history: History, flight: Flight, load_end: float | None
 ) -> Flight:
-    """Let a flight that contains the given end of the load begin there, as ``suggest`` does."""
+    """Begin the flight that contains the given end of the load at that time, as ``suggest`` does."""
     start, end = flight.within(history.time)
     if load_end is None or not start <= load_end < end:
         return flight
@@ -283,7 +283,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Return the row with the suggestion for its flight, which starts after the previous landing.
+    """Complete a row with the suggestion for its flight, which starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
@@ -294,7 +294,7 @@ def _suggest_window(
     flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
         flight_settings = replace(flight_settings, landing=None)
-    # the energy alone may not show the end of the flight to td, so keep the margin before the listed end
+    # At a td the energy alone may not show the end of the flight, so the margin before the listed end is kept.
     window = row.start, compute_last_td(row.end, row.margin.time)
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
@@ -320,7 +320,7 @@ def _suggest_window(
 
 
 def _explain_grade(decision: Decision, pair: Pair) -> str:
-    """Explain why a pair is not planned, and how to plan it anyway."""
+    """Explain why a pair is too poor to be planned, and how to plan it anyway."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     advice = f"with `min_quality` {decision.grade} it is planned nevertheless"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
@@ -339,7 +339,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
-    """Leave out each window that locks in energy before a much longer one, which then may need a further run."""
+    """Leave out each window that locks in energy if a much longer window follows, which would need a further run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         longest_after = max(
@@ -370,7 +370,7 @@ def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
 def _mark_status(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[PlannedFlight]:
-    """Mark windows to be planned again: after the first that locks in energy, or after a contact of rigid parts."""
+    """Mark windows to be planned again: all after the first that locks in energy, or after a contact of rigid parts."""
     in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
     if in_contact:
@@ -388,7 +388,7 @@ def _mark_status(
 
 
 def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
-    """Yield a warning if a short window replaces a longer one that could be supported instead."""
+    """Yield a warning if a short window prevents a longer window from being supported by this run."""
     first = next(
         (row for row in rows if row.status == "supported" and row.locks_in), None
     )
@@ -412,7 +412,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
 def _warn_about_windows(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[Caution]:
-    """Yield the warnings about all windows, each once."""
+    """Yield the warnings about all windows, without duplicates."""
     for done in done_rows:
         window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.description}"
         if done.rigid_in_contact:

@@ -37,27 +37,27 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# Number of energy peaks that are tried of each kind: the highest ones have little kinetic energy for several modes,
-# and the last ones save most.
+# Number of highest energy peaks and of last energy peaks that are tried. At the highest peaks several modes have little
+# kinetic energy, and the last peaks save most.
 _MOST_PEAKS: Final = 12
-# For many modes the smallest residual is searched among windows of at least these shares of the longest one [-].
+# For many modes the smallest residual is searched for among windows with at least these shares of the longest one [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
-# Good windows of at least this share of the longest good one save as much; the smallest residual decides then [-].
+# Good windows with at least this share of the longest one are treated as equally long [-]; the residual then decides.
 _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in an even grid: a curve of that many points looks smooth on paper and on a screen.
+# Number of td in an even grid. A curve with this many points looks smooth on paper and on a screen.
 STEPS: Final = 200
-# Decimals of an error shown to the user.
+# number of decimals of an error that are shown to the user
 _READ: Final = 3
 # A longer pair is mentioned if it exceeds the recommended one by this share of the window [-].
 _MUCH: Final = 0.1
-# Factor on the spread of the contact time shown by the energy: a constant energy may hide many vibrating modes.
-# In 20 computed falls the factor was up to 1.9.
+# Safety factor on the spread of the contact time that follows from the energy, since a constant energy may hide many
+# vibrating modes. In 20 computed falls a factor of up to 1.9 was needed.
 _HIDDEN: Final = 2.0
 
 
 def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
-    """Return upper bounds for the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
+    """Return upper bounds on the rigid time of the recommended tr at each td of ``times``, shape (n,) [time].
 
     If only the level decides, that tr does not lie before the energy first comes near the level at td. "Near" is the
     tolerance, or the margin of like levels if the energy passes the level itself and turns twice before td.  If a model
@@ -88,7 +88,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    # or later, but after the state before
+    # The level is reached at this state or after the state before it.
     entered = time[np.maximum(_find_first_near(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
@@ -122,7 +122,7 @@ class Chosen(NamedTuple):
     longest: Pair | None
 
     def given_up(self, pair: Pair | None) -> Pair | None:
-        """Return the longest pair if it is rigid much longer than the recommended ``pair``, otherwise None."""
+        """Return the longest pair if it is rigid for much longer than the recommended ``pair``, otherwise None."""
         limit = _MUCH * (self.inside[1] - self.inside[0])
         longest = self.longest
         if longest and pair and longest.rigid_time - pair.rigid_time > limit:
@@ -190,7 +190,7 @@ def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
     """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # there is no pair before the first time
+    grid = np.linspace(*window, steps + 1)[1:]  # td must be after the first time
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         intervals = np.searchsorted(grid, peaks)
@@ -199,12 +199,12 @@ def list_offered_times(
         peaks = peaks[highest]
         grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
-    # a run that ends at td is useless
+    # A run that ends at td is useless.
     return times[times < situation.history.time[-1]], set(peaks.tolist())
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
-    """Return the error by which pairs at different td are compared [-]; None without a pair or with a level too high.
+    """Return the error by which pairs are compared across td [-]; None without a pair or if its level is too high.
 
     A level is too high if it exceeds the largest possible vibration energy.
     """
@@ -270,7 +270,7 @@ def _find_unbeaten(
 
 
 def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
-    """Return True if a pair at the td of a situation may be as good as a pair with ``error``, and as long.
+    """Return True if a pair at the td of a situation may have an error and a rigid time as good as given.
 
     Pairs by deformations are not compared with pairs by levels.
     """
@@ -313,7 +313,7 @@ def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Cho
 def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Return the situation with the most certain flight in ``window``, and its part that keeps the margin [time].
+    """Return the situation with the most certain flight in ``window``, and the part of it that keeps the margin [time].
 
     Raises
     ------
@@ -374,7 +374,7 @@ def _rate_certainty(situation: Situation) -> tuple[bool, int]:
 def _choose_by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td with the longest rigid window of similar residual, and that with the longest of all."""
+    """Return two td: the longest rigid window among the best residuals, and the longest rigid window of all."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -406,7 +406,7 @@ def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _rate_tr_at(situation: Situation) -> int:
-    """Return how certain the tr recommended at a td is, from 0 to 2; 0 without one."""
+    """Return how certain the tr recommended at a td is, from 0 to 2; 0 if no tr is recommended."""
     best = next(rank_candidates([situation], in_flight=True)).chosen
     return 0 if best is None else rate_certainty_of_tr(best)
 
@@ -414,11 +414,11 @@ def _rate_tr_at(situation: Situation) -> int:
 def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td of a long window with a small residual, for many modes, and the longest acceptable one.
+    """Return, for many modes, the td of a long window with a small residual, and that of the longest acceptable window.
 
-    The energy at td does not matter.  Of good windows the longest one is used, since a smaller residual than a good one
-    is worth less than a longer rigid time; of others the one with the smallest residual.  If no long window is good, a
-    shorter good one is used.
+    The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
+    more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
+    window, the smallest residual decides.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -443,7 +443,7 @@ def _choose_by_modes(
     if good:
         return _find_best_of_long(good)[0].td, longest
     least_error = min(best.error for _, best in choices[0])
-    # no more than a change of tr within its timing tolerance may add
+    # The error may be larger by as much as a tr within its timing tolerance may add.
     limit = least_error + TOLERATED_GROWTH
     alike = _find_longest(pair for pair in choices[0] if pair[1].error <= limit)
     return _get_td(alike), longest
@@ -477,7 +477,7 @@ def _list_times_by_modes(
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
-    # The smallest of many estimates is too optimistic, so half of the half-width is added.
+    # Half of the half-width is added, since the smallest of many estimates is too optimistic.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
     middle = squares[1:-1]
     is_lowest = (middle <= squares[:-2]) & (middle < squares[2:])
@@ -504,7 +504,7 @@ def _find_least_error(
 def _choose_by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td by the level alone: the best is closest to the largest vibration energy, 2 <E>."""
+    """Return the td chosen by the level alone; the best level is the closest to the largest vibration energy, 2 <E>."""
     mean = compute_mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
@@ -512,7 +512,7 @@ def _choose_by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, compute_shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    # without a search for an oscillator at each td
+    # No oscillator is searched for at each td, which would take long.
     best = next((td for td in below if _select_acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
@@ -552,7 +552,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, the last of equal ones; None if there is none."""
+    """Return the choice with the longest rigid time, the last one if several are equal; None without choices."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

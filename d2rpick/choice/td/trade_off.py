@@ -1,4 +1,4 @@
-"""Show what each td offers: the best tr over a grid of td and energy peaks, as error against rigid time."""
+"""Show what each td offers: the error and the rigid time of the best tr, for a grid of td and the energy peaks."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Another td is named if its error is at most this share of the error at the given td, and digits show it [-].
+# Another td is mentioned if its error is at most this share of the error at the given td [-], as displayed.
 _MUCH_LESS: Final = 0.5
-# A pair that gives up more than this share of the rigid time is not comparable [-].
+# A pair that keeps less than this share of the rigid time is not compared [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td on the grid of a page: a few pixels apart, and finer than the steps of a slider.
+# Number of td on the grid of a page. They are a few pixels apart, and finer than the steps of a slider.
 _STEPS_OF_PAGE: Final = 120
-# Fewest td for a flight in a plan of many: a curve of fewer points shows little.
+# Fewest td per flight if a plan has many flights. A curve with fewer points shows little.
 _FEWEST_STEPS: Final = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
-    """The answer of ``suggest`` for one td, most of which is computed on access.
+    """The answer of ``suggest`` for one td; most of it is computed only on access.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
     offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
@@ -69,7 +69,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The recommended pair of this td, by which td are compared; None if no tr is recommended."""
+        """The recommended pair at this td, which is used to compare offers; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -136,7 +136,7 @@ class Offer(AnswerAtTd):
 
     @property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td, over that of the reference run."""
+        """Bounds of the mean energy after td, relative to the reference run."""
         return self.answer.mean_energy_bounds
 
 
@@ -155,7 +155,7 @@ def make_offers(
         judged_up_to_best = judged.at(np.concatenate(orders))
         ends = accumulate(
             rows.size for rows in orders
-        )  # noisy records have many candidates
+        )  # Candidates before the flight are omitted, since noisy records have very many.
         for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
             best = replace(
                 candidates,
@@ -167,7 +167,7 @@ def make_offers(
 
 @dataclass(frozen=True)
 class TradeOff:
-    """Answer of ``explore``: the offers by ascending td in ``td_window`` [time], which keeps the margin.
+    """The answer of ``explore``: the offers in ascending order of td in ``td_window`` [time], which keeps the margin.
 
     ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
     window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
@@ -236,7 +236,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # the full search gives the reason why there is no oscillator
+    # The full search is used, because it gives the reason why there is no oscillator.
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
@@ -246,10 +246,10 @@ def explore_run(
     ]
     requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
-    # the first td of the flight has too few states before it to show a vibration
+    # Before the first td of the flight there are too few states to show a vibration.
     warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        # the energy alone shows a different flight for each td, so the flight of ``suggest`` is shown
+        # The energy alone shows a different flight for each td, so the flight that ``suggest`` finds is shown.
         situation = warned = fully(td)
     start = requested or max(
         filter(_is_comparable, offers),
@@ -294,7 +294,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
         }
         for offer in sorted(group, key=lambda offer: printed[offer.td]):
             rigid, error = printed[offer.td]
-            # equal pairs are both Pareto-optimal
+            # Two equal pairs are both Pareto-optimal.
             if error < smallest_error or (error, rigid) == (
                 smallest_error,
                 longest,
@@ -305,7 +305,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest offer with half the error, or the recommended one if better, or None.
+    """Return the nearest offer with half the error, else the recommended offer if it is better, else None.
 
     Like ``suggest``, it looks at the energy peaks first; without one it takes a Pareto-optimal offer.
     """
@@ -341,7 +341,7 @@ def _warn_about_window(
     offers: Sequence[Offer],
     suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
-    """Yield the warnings that concern the whole window; each offer has those of its own td."""
+    """Yield the warnings that concern the whole window. Warnings about a single td belong to its offer."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
         caution for caution in warn_about_td(situation) if caution.code not in of_td
@@ -358,7 +358,7 @@ def _warn_about_window(
 
 
 def _explain_by_limits(suggestion: PairSuggestion) -> str:
-    """Return which limits the nearest candidate exceeds at the td that ``suggest`` chooses; empty for none."""
+    """Describe which limits the nearest candidate exceeds at the td that ``suggest`` chooses; empty without any."""
     if suggestion.recommended or not suggestion.candidates:
         return ""
     nearest = suggestion.candidates[0]
@@ -370,7 +370,7 @@ def _explain_by_limits(suggestion: PairSuggestion) -> str:
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:
-    """Explore other td for each flight of a plan; the more flights, the coarser the grids."""
+    """Explore other td for each flight of a plan. The more flights there are, the coarser are the grids."""
     answers = {
         row.number: row.answer for row in plan.flights if row.answer and row.window
     }
@@ -430,5 +430,5 @@ def explore_around(
             steps=steps,
             since=since,
         )
-    except RangeError:  # no state lies in the window
+    except RangeError:  # There is no state in the window.
         return None
