@@ -6,7 +6,7 @@ A name is imported when it is first used.  Type checkers and editors find the na
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # importing typing would slow the start
+TYPE_CHECKING = False  # importing typing would slow down start-up
 if TYPE_CHECKING:
     from typing import Any
 

@@ -36,19 +36,21 @@ class Answer:
     come from no file are written as ``<weights in memory>``.
     """
 
-    if TYPE_CHECKING:  # a field of some answers, a property of others
+    # some answers store this as a field, others compute it as a property
+    if TYPE_CHECKING:
 
         @property
         def command(self) -> tuple[str, ...]:
             """The command line that gives the same answer, without the name of the program."""
 
     cautions: tuple[Caution, ...]
-    kind: ClassVar[str]  # name in the table of forms
-    said: ClassVar[tuple[str, ...]] = ()  # attributes shown by a short form
+    kind: ClassVar[str]  # name of the answer in the table of output forms
+    # names of the attributes that the short form shows
+    said: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, result: Any, **further_fields: Any) -> Self:
-        """Make the public answer from a result of the core; ``cautions`` are added after those of the result."""
+        """Make the public answer from a result of the core; ``cautions`` follow the cautions of the result."""
         values = {field.name: getattr(result, field.name) for field in fields(result)}
         values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
         return cls(**values, **further_fields)
@@ -118,7 +120,10 @@ class Paged(Answer):
         judging: Sequence[str] = (),  # noqa: ARG002
         cards: Cards | None = None,  # noqa: ARG002
     ) -> str:
-        """Return the page; ``command`` repeats it, ``judging`` are the options with which ``card`` judges alike."""
+        """Return the page. ``command`` is the command line that repeats it.
+
+        With the options ``judging``, the command ``card`` gives the same verdicts.
+        """
         from d2rpick.report import pages
 
         written: str = getattr(pages, f"{self.kind}_page")(self, command)
@@ -171,7 +176,7 @@ class RunAnswer(Paged):
         chosen: tuple[Situation, float] | None,
         explored: TradeOff | None,
     ) -> PageContext:
-        """Return the content of a page besides the answer, with the card of the chosen situation and tr."""
+        """Return what a page shows in addition to the answer, such as the card for the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
         context = PageContext(
@@ -204,7 +209,7 @@ class RunAnswer(Paged):
         return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
-        """Return the interactive data of a page, and the command line that asks for each td."""
+        """Return the interactive data of a page, and the command line that gives the answer for a td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
@@ -217,7 +222,7 @@ class RunAnswer(Paged):
 
 def write_page(path: arguments.Path, page: str) -> Path:
     """Write a page and return its path."""
-    from pathlib import Path  # imported here: tables do not need it
+    from pathlib import Path  # imported here to start faster
 
     from d2rpick.api import arguments
 
@@ -229,7 +234,7 @@ def write_page(path: arguments.Path, page: str) -> Path:
 def build_frame(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any
 ) -> pd.DataFrame:
-    """Return a table with one row per mapping; unknown values are NaN, also if the whole column is unknown.
+    """Return a table with one row per mapping; unknown values are NaN, even if a whole column is unknown.
 
     Examples
     --------

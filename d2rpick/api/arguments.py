@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     # A number in the unit of the run, or a text with a unit, such as 64ms.
     Time = float | str
 
-_LONGEST_SHOWN: Final = 60  # length at which a wrong value is cut in a message
+_LONGEST_SHOWN: Final = 60  # largest number of characters of a wrong value in a message
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -85,7 +85,7 @@ def _format_wrong_value(value: object) -> str:
 
 
 def check_flag(name: str, value: object, default: bool) -> bool:
-    """Return True or False, the default for None; TypeError for anything else.
+    """Return True or False, or the default for None; raise TypeError for anything else.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def check_flag(name: str, value: object, default: bool) -> bool:
 
 
 def check_windows(name: str, value: object) -> list[tuple[float, float]]:
-    """Return windows of time, none for None.
+    """Return time windows; None gives no windows.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Return a hint how to write a number that has a decimal comma, empty for other texts.
+    """Return a hint on how to write a number that has a decimal comma; empty for other texts.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Return a hint how to write a time that has a unit, empty for other texts."""
+    """Return a hint on how to write a time that has a unit; empty for other texts."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -162,7 +162,7 @@ def check_optional_number(
 
 
 def check_time_window(name: str, value: object) -> tuple[float, float] | None:
-    """Return a window of time, the lower time first, or None if none is given.
+    """Return a time window, the lower time first, or None if no window is given.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
 
 
 def _is_pair(value: Any) -> bool:
-    """Return True for an ordered collection of two values, also of numpy."""
+    """Return True for an ordered collection of two values, such as a tuple or a numpy array."""
     is_ordered = (
         hasattr(value, "__len__")
         and hasattr(value, "__iter__")
@@ -196,7 +196,7 @@ def _is_pair(value: Any) -> bool:
 
 
 def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
-    """Return parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
+    """Return parts in the notation of the command line: numbers, ranges (``"10-19"``) and titles.
 
     Examples
     --------
@@ -289,12 +289,12 @@ def list_paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
 
 
 def check_run(name: str, run: object) -> None:
-    """Raise TypeError unless the argument is a run as `read` returns it."""
+    """Raise TypeError unless the argument is a run returned by `read`."""
     from d2rpick.api.tables import is_table
 
     if not (
         hasattr(run, "files") and hasattr(run, "overview")
-    ):  # imported here: its class imports this module
+    ):  # imported here because the module of the class imports this module
         if isinstance(run, str | os.PathLike):
             description = repr(run)
         else:
@@ -308,7 +308,7 @@ def check_run(name: str, run: object) -> None:
 def refuse_unknown(
     name: str, known_names: Iterable[str], other_names: Iterable[str] = ()
 ) -> NoReturn:
-    """Raise the TypeError of an unknown argument, and suggest the most similar of all names."""
+    """Raise TypeError for an unknown argument, and suggest the most similar known name."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, {*known_names, *other_names} - {name}, 1)
@@ -321,7 +321,7 @@ def refuse_unknown(
 
 
 def check_option(name: str, value: object, option: Option, default: Any = None) -> Any:
-    """Return a value converted to the kind of its option; the default for None.
+    """Return a value converted to the kind of its option, or the default for None.
 
     Examples
     --------
@@ -354,7 +354,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
 
 
 def read_choosing(choosing: Choosing | Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a request that define how to choose."""
+    """Return the fields of a request that define how the times are chosen."""
     from d2rpick.api.choosing import Choosing as Arguments
 
     expected_names = Arguments.__annotations__
@@ -390,9 +390,7 @@ def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, in
 def _check_oscillator(value: object) -> Oscillator | None:
     if value is None:
         return None
-    from d2rpick.vibration.oscillator import (
-        Oscillator,
-    )  # imported here: an oscillator is rarely given
+    from d2rpick.vibration.oscillator import Oscillator  # imported here to start faster
 
     if not isinstance(value, Oscillator):
         raise TypeError(
@@ -402,14 +400,12 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
 
 def check_weights(value: object) -> Any:
-    """Return weights, or the name of the file that contains them, or None if none are given."""
+    """Return weights, the name of a file with weights, or None if no weights are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
         return check_path("weights", value)
-    from d2rpick.choice.parts.cost import (
-        Weights,
-    )  # imported here: weights are rarely given
+    from d2rpick.choice.parts.cost import Weights  # imported here to start faster
 
     if not isinstance(value, Weights):
         raise TypeError(
@@ -440,7 +436,9 @@ def check_path(name: str, value: Path) -> str:
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
-    """Read windows as ``d2rpick plan -f value`` prints them, a line ``tr td`` for each, or the journal of a driven run.
+    """Read windows from the output of ``d2rpick plan -f value`` (a line ``tr td`` for each window).
+
+    The journal of a driven run is accepted too.
 
     Empty lines and lines that begin with ``#`` are skipped.
 
@@ -472,10 +470,11 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
-    """Return the windows of the rigid restart segments in a journal; of segments with one number, the last counts."""
+    """Return the windows of the rigid restart segments in a journal; the last segment with a number is used."""
     import json  # imported here to start faster
 
-    legs: list[tuple[int, bool, float, float]] = []  # number, True if rigid, start, end
+    # each segment as its number, True if it is rigid, its start and its end
+    legs: list[tuple[int, bool, float, float]] = []
     for line in text.splitlines():
         try:
             record = json.loads(line)
@@ -492,7 +491,7 @@ def _read_journal(text: str) -> list[tuple[float, float]]:
                     )
                 )
         except (ValueError, KeyError, TypeError):
-            continue  # an incomplete line, or one of another kind
+            continue  # an incomplete line, or a line with other content
     latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
     windows: list[tuple[float, float]] = []
     rigid_before = False

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class RunQuestion(NamedTuple):
-    """A question: the opened run, the selected energy, and how it is judged.
+    """A question: the opened run, the selected energy, and the settings by which it is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
     deck.  ``on_card`` are parts that only the card contains.
@@ -49,21 +49,19 @@ class RunQuestion(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    of_this_run: bool = (
-        True  # True if the deck, if there is one, may be that of the run
-    )
+    of_this_run: bool = True  # False if the deck was found to belong to another run
 
     @property
     def deck(self) -> str | None:
-        """The main deck of the run; None without a deck, or if it is the deck of another model."""
+        """The main deck of the run; None if there is no deck, or if the deck belongs to another model."""
         return self.request.deck if self.of_this_run else None
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Options that follow the times in the command line of the same question."""
+        """Options that follow the times in the command line that repeats the question."""
         from d2rpick.report.tables import (
             make_positional,
-        )  # imported here: most answers repeat no command
+        )  # imported here to start faster
 
         return (*self.request.asking(), *make_positional(self.request.history))
 
@@ -104,7 +102,7 @@ def make_request(
 
 
 def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
-    """Open the run of the request, or other files in the same way."""
+    """Open the run that the request names, or other files with the same options."""
     from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening
 
@@ -115,14 +113,14 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if the parts may be used for the card only, because a table has no parts."""
+    """Return True if the parts may be used only for the card, because the history is a table, which has no parts."""
     return bool(request.energy) or not run.parts
 
 
 def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> RunQuestion:
-    """Select the requested energy of a run, with the data of its deck.
+    """Select the requested energy of a run, and add the data of its deck.
 
     Parameters
     ----------
@@ -160,7 +158,7 @@ def ask_run(
     if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # refuses a named energy together with parts
+        request.selection()  # raises an error if both an energy and parts are named
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
@@ -183,7 +181,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or the weights alone; return None without either.
+    """Read the deck with its weights, or only the weights; return None if neither is given.
 
     Raises
     ------

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
-_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled at first use
+# compiled at first use to start faster
+_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
 _ONLY_JUDGED: Final = "`parts` selects the parts whose energy judges a card for {}; give a `run` with parts"
@@ -63,11 +64,11 @@ class CardOptions(TypedDict, total=False):
 if TYPE_CHECKING:
 
     class Judging(CardOptions, JudgingOptions, total=False):
-        """Options of a card, and how the windows are judged."""
+        """Options of a card, and the options by which its windows are judged."""
 
 
 def _check_option(name: str, value: Any, option: Option) -> Any:
-    """Return a value converted to the kind of its option; the solvers are known only where a card is printed."""
+    """Return a value converted to the kind of its option. Only the code that prints cards knows the solvers."""
     from d2rpick.api import arguments
 
     if option.kind == "solver":
@@ -163,7 +164,7 @@ class Cards:
         return printing._replace(solver=solver, part=tuple(parts), **values)
 
     def check_solver(self, solver: str) -> None:
-        """Refuse options that have no place in the input of ``solver``."""
+        """Refuse options that the input of ``solver`` cannot express."""
         from d2rpick.deck.printing import SOLVERS
 
         options_by_solver = {
@@ -205,7 +206,7 @@ class Cards:
         return printing, notes
 
     def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return the requirements of the deck of the run on a card, and notes on the bodies that it lacks.
+        """Return what the run's deck requires of a card, and notes on bodies that the deck lacks.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -246,12 +247,12 @@ class Cards:
         ), bodies.notes
 
 
-# Keys in the settings that apply to all commands; other keys apply to the rules of check, or to one command.
+# Keys of the settings that apply to all commands. Other keys apply to the rules of check, or to one command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
 def name_needed_argument(solver: Module) -> str:
-    """Return the argument that names what the card of ``solver`` switches."""
+    """Return the name of the argument that lists what the card of ``solver`` switches."""
     arguments_by_kind = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
@@ -260,7 +261,7 @@ def name_needed_argument(solver: Module) -> str:
 
 
 def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
-    """Return the ids in numbers and ranges; without a history all ids of a range are assumed to exist."""
+    """Return the ids given as numbers and ranges. Without a history, all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -283,7 +284,7 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card with the verdict on each of its new windows as printed; ``str`` returns its text.
+    """A card, and the verdict on each of its new windows with the times as printed; ``str`` returns its text.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
     ``cautions`` are the findings of `check` with the card in the deck of the run, and without a deck what is unknown.
@@ -326,7 +327,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card of windows, judged as printed like in `verify`, or by ``judge``.
+    """Print the card of windows, and judge them with the times as printed: as in `verify`, or by ``judge``.
 
     Raises
     ------
@@ -441,15 +442,13 @@ def card(
 def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card of windows, judged as printed if there is a run."""
+    """Print the card of windows; if there is a run, judge them with the times as printed."""
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
         request.without_history()
         return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
-    from d2rpick.api.asked import (
-        ask_run,
-    )  # imported here: a card alone does not need numpy
+    from d2rpick.api.asked import ask_run  # imported here to start faster
 
     question = ask_run(run, request, card_alone=True)
     solver = cards.solver or find_solver(question.reference.history.format)
@@ -461,7 +460,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return what is printed without a history; raise ArgumentError if something is missing."""
+    """Return the card to print without a history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Findings(Answer, Checks):
-    """Answer of `check`; it is immutable.
+    """Answer from `check`; it is immutable.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``.  ``windows`` are the
     windows in which parts are rigid.  ``notes`` report what the readers of the history left out or assumed, and unused
@@ -126,9 +126,7 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.asked import (
-        make_request,
-    )  # imported here: without a history nothing is computed
+    from d2rpick.api.asked import make_request  # imported here to start faster
 
     names = arguments.list_paths("decks", decks)
     if history is not None:
@@ -173,7 +171,7 @@ def find_findings(
     else:
         from d2rpick.rules.judgement import (
             HistoryJudge,
-        )  # imported here: it loads numpy
+        )  # imported here to start faster
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
@@ -199,7 +197,7 @@ def find_findings(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that d2rpick wrote, by the configuration nearest to it."""
+    """Check a deck that d2rpick wrote, with the configuration nearest to it."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -211,7 +209,7 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result of each deck once, for a run by its first file; a folder stands for its main decks."""
+    """Yield the result of each deck once, of a run under its first file. A folder stands for its main decks."""
     visited: set[str] = set()
     real_folder = cache(
         os.path.realpath
@@ -255,13 +253,13 @@ def _check_each(
 def _list_decks(name: str) -> list[str] | DeckError:
     """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
     try:
-        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
+        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path fails on odd names
     except DeckError as error:
         return error
 
 
 def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
-    """Return for each deck of LS-DYNA its small restarts: the only other decks in its folder."""
+    """Return the small restarts of each LS-DYNA deck, if they are the only other decks in its folder."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
@@ -297,5 +295,5 @@ def _check_one(
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # the error concerns the history, by which all decks are judged
+            raise  # the error concerns the history, with which all decks are judged
         return Unreadable(name, error, (source,))

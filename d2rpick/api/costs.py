@@ -1,4 +1,4 @@
-"""Determine which parts may be switched and the savings of sets of parts; fit element costs to runs of a site."""
+"""Determine which parts may be switched and what sets of parts save; fit element costs to the runs of a site."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PartTable(Paged, sets_of_parts.Parts):
-    """Answer of `parts`; it is immutable.
+    """Answer from `parts`; it is immutable.
 
     ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` the sets that are compared, ``recommended``
     the set to use, None without one; its ``parts`` and ``cost_share`` are arguments of `suggest` and `plan`.
@@ -152,7 +152,7 @@ def compare_parts(
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
-    """Return the window in which sets are compared, or its end; raise ArgumentError if there is none."""
+    """Return the window in which sets are compared, or only its end; raise ArgumentError if neither is given."""
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
@@ -162,7 +162,7 @@ def check_times(tr: float | None, td: float | None) -> Times | float | None:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Calibration(Answer, calibration.FittedWeights):
-    """Answer of `calibrate`; it is immutable.
+    """Answer from `calibrate`; it is immutable.
 
     ``weights`` are an argument of `parts`, `suggest`, `plan`, `explore` and `verify`.  ``told`` names the formulations
     that the runs determine; the others keep the measured ratio.  ``misfit`` is relative to the time of a run segment
@@ -174,7 +174,7 @@ class Calibration(Answer, calibration.FittedWeights):
     said = ("weights", "told", "misfit")
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per formulation: its weight, that measured with OpenRadioss, and whether the runs determine it.
+        """Return a row per formulation: its weight, the OpenRadioss weight, and whether the runs determine the weight.
 
         Examples
         --------

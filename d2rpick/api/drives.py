@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
 # shortest time between td and a contact [s]
 _SHORTEST = 2e-3
-# cost of a cycle with rigid parts relative to a deformable one, if the deck does not determine it
+# cost of a cycle with rigid parts relative to a cycle without, if the deck does not determine it
 _UNKNOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Drive(Paged, Driven):
-    """Answer of ``d2rpick drive``; it is immutable."""
+    """Answer from ``d2rpick drive``; it is immutable."""
 
     command: tuple[str, ...]
     kind = "drive"
@@ -104,7 +104,7 @@ class Driving:
 
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
-        """Yield the driver of the run in its folder, and lock the folder against other drivers.
+        """Lock the folder of the run against other drivers, and yield the driver.
 
         Raises D2RPickError if another driver is at work there, if the folder contains something else, if the run has
         begun and is not to be resumed, or if the disk is full.
@@ -134,7 +134,7 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: the folder is not empty; choose another one"
                 )
-            if not computed:  # a corrected deck or command may be different
+            if not computed:  # the user may have corrected the deck or the command
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)
                 journal.add("begun", deck=digest)
@@ -197,7 +197,10 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the saved share if a deformable run takes the mean time of its deformable segments throughout."""
+    """Return the saved share of the CPU time; None if it is unknown.
+
+    A run without switching is assumed to cost the mean of the deformable segments throughout.
+    """
     if any(leg.cpu is None for leg in legs):
         return None
     deformable = [leg for leg in legs if not leg.order.rigid]

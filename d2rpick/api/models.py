@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-MOST_REPLAYED = 10_000_000  # a longer text would have some gigabytes
+# largest number of states; a longer text would have several gigabytes
+MOST_REPLAYED = 10_000_000
 HISTORIES = (
     "csv",
     "hdf5",
@@ -44,22 +45,23 @@ PARAMETERS = (
     "ground_stiffness",
 )
 TD = 0.37  # td of the published study, 10 ms before the ground contact [s]
-TILT = 30.0  # a falling box lands on an edge, so that it tumbles [degrees]
+TILT = 30.0  # tilt of a falling box [degrees]: it lands on an edge and tumbles
 T_END = {
     False: 0.42,
     True: 1.2,
-}  # by whether the box is dropped: time for some bounces [s]
-BALANCED = 0.01  # largest imbalance of the energy of a run [-]
+}  # end time [s], long enough for some bounces; the key is True for a dropped box
+# largest energy imbalance of a run, relative to the largest total energy [-]
+BALANCED = 0.01
 
 
 def _copy_option(name: str, **changes: Any) -> Any:
-    """Return an option of a request, changed for this table."""
+    """Return an option of a request with changes for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Request for a motion of the oscillator: its parameters, its start, and when it is rigid."""
+    """Request for a motion of the oscillator: its parameters, its initial state, and when it is rigid."""
 
     stiffness: float = _copy_option("stiffness")
     mass: float = _copy_option("mass")
@@ -128,7 +130,7 @@ class Motion:
 
     @property
     def oscillator(self) -> Oscillator:
-        """The oscillator that moves; raise ArgumentError if it is incomplete."""
+        """The oscillator of the request; raise ArgumentError if it is incomplete."""
         parameters = {
             name: getattr(self, name)
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
@@ -136,7 +138,7 @@ class Motion:
         oscillator = Request(**parameters, v0=0.0).oscillator
         assert (
             oscillator is not None
-        )  # click requires the options that define an oscillator
+        )  # the command line always has a complete oscillator, because click requires its options
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
@@ -293,7 +295,7 @@ def _check_windows(
 
 
 class Scanning:
-    """A scan to be computed: the reference run, the recommendation from it, and the other tr."""
+    """A scan to be computed: the reference run, the recommendation from it, and the other values of tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -331,7 +333,7 @@ class Scanning:
 
 
 def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few steps."""
+    """Return a caution if the energy of a run is not balanced, for example if damping acts within a few time steps."""
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()

@@ -1,4 +1,4 @@
-"""Find what each td of a flight costs, and plan the rigid windows of all flights."""
+"""Find the error and saving for each td of a flight, and plan the rigid windows of all flights."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times
 
-_STEPS: Final = 200  # number of td to explore
+_STEPS: Final = 200  # default number of td values to explore
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Exploration(RunAnswer, trade_off.TradeOff):
-    """Answer of `explore`; it is immutable.
+    """Answer from `explore`; it is immutable.
 
     ``offers`` are sorted by td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its measures
     in ``best``.  ``recommended`` is the offer that `suggest` chooses.  ``step`` is the nearest unbeaten td with half
@@ -100,7 +100,7 @@ def explore(
     weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Exploration:
-    """Find what each td costs, as ``d2rpick explore`` does.
+    """Find the error and saving for each td, as ``d2rpick explore`` does.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def explore_for_question(
     td_window: tuple[float, float] | None,
     steps: int,
 ) -> Exploration:
-    """Find what each td costs in a window, or in the longest flight."""
+    """Find the error and saving for each td in a window, or in the longest flight."""
     check_window("td_window", td_window)
     result = trade_off.explore_run(
         question.reference, question.settings, td_window, td=td, steps=steps
@@ -160,7 +160,7 @@ def explore_for_question(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Plan(RunAnswer, planning.RunPlan):
-    """Answer of `plan`; it is immutable.
+    """Answer from `plan`; it is immutable.
 
     ``flights`` has a row per flight with ``window``, ``status`` and ``reason``.  ``windows`` are the (tr, td) that this
     run supports, ``all_windows`` also those that need a switched run first.  ``next_run`` are the windows of the next
@@ -188,13 +188,16 @@ class Plan(RunAnswer, planning.RunPlan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card of the next run, judged as printed, with ``every`` new window or only the supported ones."""
+        """Print the card for the next run, and judge its windows with the times as printed.
+
+        It contains all new windows if ``every`` is True, else only the windows that the history supports.
+        """
         return self.printed(
             Cards.of(options), every=arguments.check_flag("every", every, False)
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card of the next run, with its new windows judged; return None if no window is new."""
+        """Print the card for the next run, and judge its new windows; return None if there is no new window."""
         new = self.all_windows if every else self.windows
         question = self.question
         question = question._replace(
@@ -224,7 +227,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
-        """Return the card of the next run; None if no parts are named, or the bodies of the deck cannot be switched."""
+        """Return the card for the next run; None without named parts, or if the deck's bodies cannot be switched."""
         from d2rpick.choice.judged_card import complete_printing, list_switched
 
         try:
@@ -306,7 +309,7 @@ def plan_for_question(
     if done:
         from d2rpick.deck.printed_card import (
             refuse_overlapping_windows,
-        )  # imported here since a plan alone needs no decks
+        )  # imported here to start faster
 
         windows = refuse_overlapping_windows(done)
     earlier = (
@@ -322,7 +325,7 @@ def plan_for_question(
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += (
         ["--done", "-"] if windows else []
-    )  # windows as `check` reads them on standard input, one line each
+    )  # one line for each window, in the form that `check` reads from standard input
     times += [
         text
         for name in (before.sources if before else ())
@@ -343,7 +346,8 @@ def write_planned_deck(
     from d2rpick.rules.judgement import HistoryJudge
 
     question = plan.question
-    done = card.card.windows[: len(plan.done)]  # windows with the times as printed
+    # windows with the times that the card prints
+    done = card.card.windows[: len(plan.done)]
     names = write_deck(
         question.request.deck or "", card.card, folder, overwrite=overwrite
     )

@@ -32,14 +32,15 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
-    0.7  # relative to the reference run; well-switched computed runs had at least 0.77
+    # smallest mean energy relative to the reference run; well-switched computed runs had at least 0.77
+    0.7
 )
-# Options for reading a history, and all of them except the parts, which a deck defines itself.
+# Options for reading a history, and the same options without the parts, which a deck defines itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 _MODEL: Final = (*OSCILLATOR, "no_verify")
-# Options that say how a pair is chosen, how those of sets of parts and of many runs are, and how cards are judged.
+# Options for choosing a pair, for choosing pairs for sets of parts and many runs, and for judging cards.
 _USES: Final = list_uses()
 CHOOSING: Final = (*_USES, *_MODEL)
 CHOOSING_FOR_SETS: Final = (
@@ -54,7 +55,7 @@ ADVANCED: Final = (
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights without a file.
-# A command line with it is refused, so that it never uses other weights.
+# Such a command line is refused, so that it never runs with other weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -172,7 +173,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  odd names
 
     def check_deck(self) -> None:
-        """Refuse options that need a deck if there is none."""
+        """Refuse options that need a deck if no deck is given."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError(
                 "`step_ratio` needs `cost_share` or `deck` too: the CPU time depends on both"
@@ -225,7 +226,7 @@ class Request(ChoiceOptions, ReadingOptions):
         if oscillator is not None and self.v0 is not None:
             from d2rpick.vibration.oscillator import (
                 to_mode,
-            )  # imported here: it is rarely given
+            )  # imported here to start faster
 
             mode = to_mode(oscillator, self.v0)
         # options without a value keep the defaults of the settings
@@ -250,7 +251,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
-        """Return the given options, or those in ``names``, as they are typed after a td."""
+        """Return the given options, or only those in ``names``, as typed after a td on the command line."""
         chosen = list(self._given())
         if names is not None:
             chosen = [name for name in chosen if name in names]
@@ -261,7 +262,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` judge by the same history."""
+        """Return the options with which ``card`` and ``check`` use the same history as judge."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
@@ -289,7 +290,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
 
 def write_option(name: str, value: Any, *, many: bool) -> Iterator[str]:
-    """Yield the words of an option with its value, or its ``many`` values, as typed."""
+    """Yield the words of an option and its value as typed; ``many`` is True if it has several values."""
     if isinstance(value, bool):
         yield from (f"--{make_option_name(name)}",) * value
         return
@@ -334,7 +335,7 @@ def check_window(name: str, window: tuple[float, float] | None) -> None:
 def choose_time_or_window(
     td: float | None, window: tuple[float, float] | None
 ) -> float | tuple[float, float] | None:
-    """Return the given td or the window for it; raise ArgumentError for both."""
+    """Return the given td or the window for td; raise ArgumentError if both are given."""
     if td is not None and window is not None:
         raise ArgumentError(
             "`td` and `td_window` exclude each other: give `td` to keep that time, `td_window` to have it chosen"

@@ -1,4 +1,4 @@
-"""Support runs while they are computed: decks that switch themselves, and events of a run in progress."""
+"""Prepare decks that switch in their first run, and report the events of a run in progress."""
 
 from __future__ import annotations
 
@@ -136,14 +136,12 @@ def follow(
     >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
-    from d2rpick.running import watch  # imported here: `first` does not need it
+    from d2rpick.running import watch  # imported here to start faster
 
     selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
     if deck is not None:
-        from d2rpick.deck import (
-            read_inventory,
-        )  # imported here: a deck is rarely named
+        from d2rpick.deck import read_inventory  # imported here to start faster
 
         inventory = read_inventory(arguments.check_path("deck", deck))
     time = arguments.check_optional_number("wait", wait)

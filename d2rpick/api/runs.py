@@ -1,4 +1,4 @@
-"""Provide a run for scripts: read from files or from memory, or taken from a table."""
+"""Provide runs for scripts: read from files or from memory, or taken from a table."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ class Run:
             columns = {
                 part.name: energies[:, at] for at, part in enumerate(history.parts)
             }
-            # the parts and the energy of their sum have the same times
+            # the energies of the parts and their sum have the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
             "source": list(history.source),

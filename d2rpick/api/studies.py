@@ -1,4 +1,4 @@
-"""Ask many runs the same question, and keep a file from which a study can be resumed: a line for each judged run."""
+"""Ask the same question of many runs. A file with a line for each judged run allows a study to be resumed."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # beginning of the summary after the rows
+_LAST: Final = b'{"schema": '  # first words of the summary below the rows
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Study(Paged, core.StudyOfRuns):
-    """Answer of `study`; it is immutable.
+    """Answer from `study`; it is immutable.
 
     ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None without a tr.  ``common`` is
     one tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the
@@ -84,7 +84,7 @@ def study(
     jobs: int | None = 1,
     **choosing: Unpack[Choosing],
 ) -> Study:
-    """Ask many runs the same question, as ``d2rpick study`` does.
+    """Ask the same question of many runs, as ``d2rpick study`` does.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def study(
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:
-    """Replace patterns by the files and folders that they match, each a run; a name that matches nothing is kept."""
+    """Replace patterns with the files and folders that they match, each of them a run. Other names are kept."""
     from glob import glob
 
     runs: list[str] = []
@@ -165,7 +165,7 @@ def _remove_repeated(names: Iterable[str]) -> list[str]:
 def make_question(
     request: Request, td: float | tuple[float, float] | None, *, curve: bool
 ) -> Question:
-    """Return the question to every run; with its ``curve`` if the energies of all runs are drawn."""
+    """Return the question to ask of every run; ``curve`` is True if the energies of all runs are drawn."""
     return Question(
         td, request.settings, request.selection(), request.input_format, curve=curve
     )
@@ -179,7 +179,7 @@ def answer_study(
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
-    # neither the study nor its command mentions the CPU time
+    # a study reports no CPU time, so its command omits these options
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
         core.compare_rows(td, rows),
@@ -246,7 +246,7 @@ def compute_fingerprint(question: Question) -> str:
 
 
 def write_row(row: StudyRow, question_digest: str) -> str:
-    """Return a row as one line: its values, and what is needed to read it back later.
+    """Return a row as one line that contains its values and the data needed to read it back.
 
     ``asked`` is the ``fingerprint`` of the question.
     """
@@ -290,7 +290,7 @@ class Ledger:
         try:
             with Path(name).open(
                 "a+b"
-            ) as file:  # checks that the file is writable before the work begins
+            ) as file:  # fails before the work begins if the file is not writable
                 file.seek(0)
                 content = file.read()
             if new:  # the first row creates the file
@@ -309,7 +309,7 @@ class Ledger:
             else:
                 cut = text.startswith(_FIRST) and not text.endswith(
                     b"}"
-                )  # at the end of a killed study
+                )  # the incomplete last line that a killed study leaves
                 self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
@@ -341,7 +341,7 @@ class Ledger:
         return None
 
     def taking(self, sources: Sequence[str]) -> int:
-        """Count the runs that are already known."""
+        """Count the runs whose rows are already in the file."""
         self.known = {
             number: row
             for number, source in enumerate(sources)
@@ -350,7 +350,7 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Return the number of ``runs`` runs taken from the file, and why other rows were not used."""
+        """Return a text: how many of ``runs`` runs are taken from the file, and why other rows were not used."""
         if self.outdated:
             outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:
@@ -362,12 +362,12 @@ class Ledger:
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:
-        """Append the row of a judged run; it is in the file when this method returns."""
+        """Append the row of a judged run; the file contains it when this method returns."""
         if row.status in (
             FAILED,
             UNREADABLE,
             INTERNAL_ERROR,
-        ):  # such a row is computed again next time
+        ):  # a row that is not stored is computed again next time
             return
         try:
             append_as_a_whole(

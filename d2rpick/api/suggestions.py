@@ -1,4 +1,4 @@
-"""Choose switch times, and judge a pair of them."""
+"""Choose the switch times tr and td, and judge a given pair."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Suggestion(RunAnswer, answers.PairSuggestion):
-    """Answer of `suggest`; it is immutable.
+    """Answer from `suggest`; it is immutable.
 
     ``candidates`` are ranked, best first.  ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
     are None, with the reason in ``warnings``; the better pair may be the recommended pair.  ``quality`` of the
@@ -109,7 +109,7 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Verdict(RunAnswer, answers.PairVerdict):
-    """Answer of `verify`; it is immutable.
+    """Answer from `verify`; it is immutable.
 
     ``verified``: the pair is good.  ``reasons``: why it is not, or what to keep in mind.  ``tr_ok`` and ``td_ok`` are
     None if the record does not show it.  ``candidate`` has the measures of the pair; ``quality`` is None if the pair is
@@ -122,7 +122,7 @@ class Verdict(RunAnswer, answers.PairVerdict):
 
     @property
     def tr(self) -> float:
-        """When the parts are switched to rigid [time]."""
+        """Time at which the parts are switched to rigid [time]."""
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
@@ -311,7 +311,7 @@ def verify(
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse an incomplete pair: without a switched run both times are needed."""
+    """Refuse an incomplete pair: both times are needed unless a switched run gives them."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"

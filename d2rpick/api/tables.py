@@ -30,7 +30,7 @@ def is_table(value: Any) -> bool:
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if kind:
         return hasattr(value, "ndim") and kind not in "OUST"
-    # by the attributes of its type: asking for the columns of a lazy frame would compute them
+    # look at the type, because reading the columns of a lazy frame would compute them
     return isinstance(value, Mapping) or any(
         hasattr(type(value), name) for name in _METHODS_OF_TABLES
     )
@@ -60,7 +60,8 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return table
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
-    if hasattr(table, "to_dataframe"):  # xarray; only an array has a name
+    # an object of xarray; only a DataArray has a name
+    if hasattr(table, "to_dataframe"):
         if hasattr(table, "name"):
             frame = table.to_dataframe(name=_SERIES_NAME)
         else:

@@ -109,7 +109,7 @@ def is_time_with_unit(text: str) -> bool:
 
 
 def find_unit_of_run(run: Run | None) -> TimeUnit:
-    """Return the unit of time that the files of an opened run name; empty if they name none, or different ones."""
+    """Return the time unit that the files of an opened run name; empty if they name no unit, or different units."""
     if run is None:
         return _WITHOUT_RUN
     arguments.check_run("run", run)
@@ -120,7 +120,7 @@ def find_unit_of_run(run: Run | None) -> TimeUnit:
 def find_common_unit(
     runs: Sequence[Sequence[str]], selection: Selection, input_format: str
 ) -> TimeUnit:
-    """Return the unit of time that all runs name, each given by its files; empty if they name none, or different ones.
+    """Return the time unit that all runs name, each given by its files; empty if they name no unit, or different units.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def _choose_only_unit(units: set[str]) -> str:
 
 
 def convert_typed_time(text: str, unit: str, source: str) -> float:
-    """Return a time with its unit as a number in the ``unit`` of a run; error if ``source`` names no unit.
+    """Return a typed time as a number in the ``unit`` of the run; raise an error if ``source`` names no unit.
 
     Raises
     ------

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 # Unicode categories that are escaped: control and format characters (escape codes, text direction), line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
-_MOST_NAMED: Final = 20  # names in one message
+_MOST_NAMED: Final = 20  # largest number of names that one message lists
 
 # Code of the caution on an input that was skipped because of an error of the program.
 INTERNAL_ERROR: Final = "internal-error"
@@ -59,12 +59,12 @@ class Caution(NamedTuple):
     message: str
 
 
-# Errors that are not errors of the program itself.
+# Errors with a cause outside the program, such as wrong input, a full disk or too little memory.
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return what ``read`` returns, or None if the history lacks it in some state."""
+    """Return the result of ``read``, or None if the data are missing in some state of the history."""
     try:
         return read()
     except FormatError:
@@ -115,7 +115,7 @@ def make_printable(text: str) -> str:
 
 
 def format_ranges(ids: Iterable[int]) -> list[str]:
-    """Return numbers in ascending order, three or more consecutive ones as a range.
+    """Format numbers in ascending order; three or more consecutive numbers become a range.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def choose_verb(things: Collection[object]) -> str:
 def list_names(
     names: Sequence[object], most: int = _MOST_NAMED, between: str = ", "
 ) -> str:
-    """Return printable names in one line, cut after ``most`` of them.
+    """Return printable names in one line; the list is cut after ``most`` names.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Read and write files: limits on their content, changes while they are read, and complete replacement.
+"""Read files within limits on their content, detect changes during reading, and replace files as a whole.
 
 Lines of JSON that a program resumes from have a checksum, so that a damaged line is recognised.
 """
@@ -20,34 +20,35 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
 
-STDIN: Final = "-"  # name of standard input
+STDIN: Final = "-"  # file name that stands for standard input
 # Limits on a file, each with its default and its unit.
 _BOUNDS: Final = {
     "RATIO": (
         100.0,
         "times as many bytes",
-    ),  # a history unpacks to 3 to 30 times its size
-    "UNPACKED": (4e9, "bytes"),  # unpacked data are kept in memory
-    "LINE": (1e6, "bytes"),  # bytes of some 50,000 columns
+    ),  # largest ratio of unpacked to packed size: a history unpacks to 3 to 30 times its packed size
+    # largest unpacked size [bytes], because unpacked data are kept in memory
+    "UNPACKED": (4e9, "bytes"),
+    "LINE": (1e6, "bytes"),  # length [bytes] of a line with about 50,000 columns
     "DEPTH": (100.0, "groups"),
 }
 # Unpacked size from which the ratio is checked: constant columns shrink by a factor of 1000, and less is unpacked fast.
 _ALLOWED: Final = 1 << 24
-_TRIES: Final = 5  # attempts to read a file that keeps changing
+_TRIES: Final = 5  # number of attempts to read a file that keeps changing
 _TICK: Final = (
-    50_000_000  # [ns] resolution of most file times: later changes are visible
+    50_000_000  # resolution of most file times [ns]; later changes are visible
 )
-# [ns] the same for file systems that store full seconds
+# resolution of file times on file systems that store full seconds [ns]
 _COARSE: Final = 2_000_000_000
-# [ns] needed to write a byte: the times of a file are set when its last write begins
+# time to write a byte [ns]; it matters because the file time is set when the last write begins
 _SLOWEST: Final = 5
-# [s] pause for a write in progress, during which the file is incomplete
+# pause for a write in progress, during which the file is incomplete [s]
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """Bytes that can be searched."""
+    """Bytes that offer a backward search."""
 
     def __len__(self) -> int: ...
 
@@ -133,7 +134,7 @@ class FileState(NamedTuple):
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
         now = time.time_ns()
-        # The modification time can be set, even to the future; such a time is ignored.
+        # The modification time can be set to any value; a time in the future is ignored.
         latest = max(
             status.st_ctime_ns, status.st_mtime_ns if status.st_mtime_ns <= now else 0
         )
@@ -154,7 +155,7 @@ class FileState(NamedTuple):
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Return True if this is the same file, which may have grown; a new file may have the inode of an old one."""
+        """Return True if this is the same file, which may have grown. A new file can reuse an old inode."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
@@ -187,7 +188,7 @@ def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState
 def wait_for_settled_states(
     names: Sequence[str], error: type[D2RPickError]
 ) -> list[FileState]:
-    """Return the settled states of growing files, with one pause for all; ``error`` if one keeps changing."""
+    """Return the settled states of growing files after a single pause; raise ``error`` if a file keeps changing."""
     states = [_state_of(name) for name in names]
     for _ in range(_TRIES):
         moving = [state for state in states if not state.settled]
@@ -253,11 +254,11 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
         return
     try:
         path = path.resolve()
-    except RuntimeError:  # a loop of links, before Python 3.13
+    except RuntimeError:  # Python before 3.13 raises this for links that form a loop
         path = path.absolute()
-    if path.is_symlink():  # the rest of a loop
+    if path.is_symlink():  # a link that is left is part of a loop of links
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
-    # The name of the file may have the largest possible length, so no longer name can be derived from it.
+    # The temporary name is not derived from the file name, which may already have the largest allowed length.
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
     scratch = path.parent / temporary
     try:
@@ -277,7 +278,8 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
     except FileNotFoundError:
         mask = os.umask(0)
         os.umask(mask)
-        scratch.chmod(0o666 & ~mask)  # mkstemp gives access to the owner only
+        # mkstemp creates files that only the owner can access
+        scratch.chmod(0o666 & ~mask)
         return
     if hasattr(os, "chown"):
         with suppress(PermissionError):
@@ -321,7 +323,7 @@ def parse_record(line: bytes) -> dict[str, Any] | None:
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
     if checksum != f'{_compute_checksum(body)}"}}'.encode():
         return None
-    import json  # imported here for start-up
+    import json  # imported here to start faster
 
     record: dict[str, Any] = json.loads(line)
     return record

@@ -16,7 +16,7 @@ def find_reachable(
     *,
     wide: bool = False,
 ) -> list[Node]:
-    """Return the starts and all nodes to which ``further`` leads, directly or indirectly, each once.
+    """Return the starts and all nodes reached from them by repeated steps of ``further``, each once.
 
     The search is depth first; if ``wide`` it is breadth first, so that the nearest nodes come first.
 

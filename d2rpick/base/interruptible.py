@@ -1,4 +1,4 @@
-"""Make interrupts end the process from which workers are forked at once, without a message; it is imported first.
+"""Let an interrupt end the process from which workers are forked, at once and without a message. Imported first.
 
 The process starts with SIGINT blocked, so that its start cannot print a traceback either. A parent that ignores
 SIGINT, as a background job does, passes that on.

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     class Remembering(Protocol):
-        """A record with a memory."""
+        """A record that keeps the results computed for it."""
 
         @property
         def memory(self) -> Memory:
@@ -33,7 +33,7 @@ class Memory:
 
 
 def remember(function: _Function) -> _Function:
-    """Return a function that computes each result once for a record.
+    """Decorate a function so that it computes each result only once for a record.
 
     The record is the first argument.  The results are kept by the other positional arguments, which must be hashable;
     what is given by keyword must follow from these, or be without influence on the result.

@@ -13,9 +13,9 @@ from typing import Any, Final
 from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
-# End of a range of whole numbers without upper limit.
+# Stands for the end of a range of whole numbers that has no upper limit.
 UNLIMITED: Final = 2**63
-# Ranges of numbers: any, above 0, from 0 on, from 0 to 1, from 1 on.
+# Ranges of numbers: any number, above 0, from 0 up, from 0 to 1, from 1 up.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)
@@ -52,7 +52,7 @@ def make_option(
     default: Any = None,
     **keywords: Any,
 ) -> Any:
-    """Return a field of a table of options; one that can be repeated is an empty tuple by default.
+    """Return a dataclass field for an option; the default of an option that can be repeated is an empty tuple.
 
     What is known of the option besides, the ``metadata`` of the field, may be given as a mapping.
     """

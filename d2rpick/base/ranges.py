@@ -15,7 +15,7 @@ class Number(NamedTuple):
     above: bool = False
 
     def missed(self, value: float) -> str:
-        """Return the limit that a value violates as text, empty if the value is allowed."""
+        """Return as text the limit that a value violates; empty if the value is allowed."""
         if value < self.low or (self.above and value == self.low):
             return f"{'above' if self.above else 'of at least'} {self.low:g}"
         return f"of at most {self.high:g}" if value > self.high else ""

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
-_OF_REPOSITORIES: Final = (".git", ".hg")  # present in the root of a repository
-# Settings of the deck check, which are searched from the folder of each deck.
+_OF_REPOSITORIES: Final = (".git", ".hg")  # folders that mark the root of a repository
+# Settings of the deck check. They are searched for in the folder of each deck and the folders above.
 RULE_KEYS: Final = ("select", "ignore", "severity")
 # Characters that may surround the pieces of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
 _MOST_KEYS_NAMED: Final = 8
-_LONGEST_VALUE: Final = 60  # characters of a value in a message
+_LONGEST_VALUE: Final = 60  # largest number of characters of a quoted value
 
 
 class NearestSettings(NamedTuple):
@@ -151,7 +151,7 @@ def refuse_unknown_settings(
     """Raise ConfigurationError, with its line and the most similar key, for the first key that is not ``known``."""
     for name in names:
         if name not in known:
-            import difflib  # imported here: it is rarely needed
+            import difflib  # imported here to start faster
 
             near = difflib.get_close_matches(name, known, n=1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""

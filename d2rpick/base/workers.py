@@ -34,14 +34,14 @@ Result = TypeVar("Result")
 
 # A fork copies the locks of all threads; forking from one clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of waiting calls for each process: they keep it busy and need little memory.
+# Number of calls queued for each process: enough to keep it busy, and few enough to need little memory.
 _WAITING = 2
-# Fewest calls given to a cluster, whose workers may come and go.
+# Smallest number of calls given to a cluster at a time, whose workers may come and go.
 _LEAST_ON_CLUSTER = 64
 # Attempts to start a pool: after the first one, the process from which workers are forked is restarted.
 _STARTS = 3
-_DYING = 0.1  # [s] between attempts, in which the system ends a killed process
-# Errors of starting a process if the process from which it is forked was killed.
+_DYING = 0.1  # pause between attempts [s], so that the system can end a killed process
+# Errors that occur if a process is started after the process from which it is forked was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 # Timeout for a scheduler's reply [s].
 _PATIENCE = 10
@@ -51,7 +51,7 @@ def count_cores() -> int:
     """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not available on every system
+    except AttributeError:  # some systems lack this function
         return os.cpu_count() or 1
 
 
@@ -95,7 +95,7 @@ class Cores(Farm):
     def __init__(self, processes: int, module: str) -> None:
         start_importing(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        # the processes end when this end of the pipe is closed
+        # closing this end of the pipe ends the processes
         self._held, self._leash = Pipe(duplex=False)
         self._pool = self._new(processes)
 
@@ -129,7 +129,7 @@ class Cores(Farm):
                 yield self._answer_alone(number, function, item)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Submit a call to the pool, or to a new pool if the pool is broken."""
+        """Submit a call to the pool; if the pool is broken, start a new one."""
         try:
             return self._pool.submit(function, item)
         except _NOT_STARTED:
@@ -140,12 +140,13 @@ class Cores(Farm):
     def _answer_alone(
         self, number: int, function: Callable[[Item], Result], item: Item
     ) -> Finished:
-        """Compute a call in a pool of its own, so that no other call ends with its process."""
+        """Compute a call in a separate pool, so that a crash of its process ends no other call."""
         pool, future = self._begin_pool(1, function, item)
         try:
             return _make_answer(number, future)
         finally:
-            pool.shutdown(wait=False)  # so that an interrupt does not wait for the call
+            # without this, an interrupt would wait for the call to finish
+            pool.shutdown(wait=False)
 
     def _begin_pool(
         self, processes: int, function: Callable[[Item], Result], item: Item
@@ -181,8 +182,8 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 
 def _begin_work(held: Connection) -> None:
-    """End this process when the other end of ``held`` is closed, and on interrupts without a message."""
-    # True in a spawned process; in a forked one `interruptible` has changed it
+    """End this process when the other end of ``held`` is closed; an interrupt ends it without a message."""
+    # this is the case in a spawned process; in a forked process `interruptible` has already changed the handler
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
@@ -215,7 +216,7 @@ def _start_server(module: str) -> None:
     )  # Windows has no fork server
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # starting it would unblock SIGINT
+    resource_tracker.ensure_running()  # starting the server would unblock SIGINT
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
@@ -224,7 +225,7 @@ def _start_server(module: str) -> None:
 
 
 def choose_farm(processes: int, module: str) -> Farm:
-    """Return the farm for a number of processes on this machine; a single one is this process."""
+    """Return the farm for a number of processes on this machine; for 1, this process does the work."""
     return Cores(processes, module) if processes > 1 else Farm()
 
 
@@ -260,9 +261,10 @@ class Cluster(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; up to ``room`` are at the scheduler, which repeats calls of dead workers.
+        """Yield the results of all calls; the scheduler gets at most ``room`` calls at a time.
 
-        Calls are submitted in groups of at least half of ``room``, since each message costs as much as a call.
+        The scheduler repeats the calls of dead workers.  Calls are submitted in groups of at least half of ``room``,
+        since each message costs as much as a call.
         """
         from distributed import as_completed
 
@@ -291,7 +293,7 @@ class Cluster(Farm):
 
 
 def _make_cluster_answer(number: int, status: str, result: Any) -> Finished:
-    """Return the answer of a task of a cluster; ``result`` of a failed task is the error type, the error and its trace.
+    """Return the answer of a cluster task. The ``result`` of a failed task is its error type, error and traceback.
 
     The status of a successful task may have changed meanwhile: its worker may have died after it returned the result.
     """

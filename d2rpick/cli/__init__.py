@@ -49,9 +49,7 @@ _EXPERIMENTS: Final = {
 }
 COMMANDS: Final = _WORK | _EXPERIMENTS
 COULD_NOT_RUN: Final = 2
-BROKEN_PIPE: Final = (
-    141  # exit code that a shell reports for a program ended by SIGPIPE
-)
+BROKEN_PIPE: Final = 141  # exit code that a shell reports if SIGPIPE ended the program
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 
@@ -60,8 +58,8 @@ _VERSIONS: Final = (
 )
 
 
-class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe has seen enough
-    """Carries BrokenPipeError past click, which would exit with 1, the code of an objection."""
+class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe needs no more output
+    """Carries BrokenPipeError past click, which would exit with code 1. That code is reserved for objections."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -74,7 +72,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click's signature
-        """Return our help option: click would translate its own, with files from the folders of the system."""
+        """Return the help option of d2rpick. The option of click would be translated with files of the system."""
         return self._help
 
     @cached_property
@@ -94,9 +92,7 @@ class Documented(click.Command):
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the examples, no wider than the help."""
-        from d2rpick.report.tables import (
-            wrap_command,
-        )  # imported here: most commands do not need it
+        from d2rpick.report.tables import wrap_command  # imported here to start faster
 
         lines = [
             wrap_command(f"  {line}", formatter.width)
@@ -150,7 +146,7 @@ class _CommandGroup(Documented, click.Group):
             ctx.exit(COULD_NOT_RUN)
         ctx.meta["d2rpick.command"] = tuple(
             args
-        )  # a copy, because click empties the list of arguments
+        )  # a copy is kept, because click empties the list of arguments
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -183,20 +179,20 @@ class _CommandGroup(Documented, click.Group):
             stop_with_error(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             stop_with_error(error.format_message())
-        except OSError as error:  # raised if a help or version text cannot be written
+        except OSError as error:  # the help or the version cannot be written
             stop_with_error(format_in_one_line(error))
         except click.Abort:  # click converts an interrupt to this
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # keeps Python from complaining when it closes the stream at exit
+            # keeps Python from reporting an error when it closes the stream at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return True if an interrupt caused the error, as Python reports one during the creation of a class."""
+    """Return True if an interrupt caused the error. Python wraps an interrupt during the creation of a class."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -238,7 +234,8 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        lines = examples.replace("\\\n    ", "").split("\n")  # each command on one line
+        # each command of the examples on one line
+        lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(
             function.__name__, cls=cls, help=help_text, epilog=epilog, **settings

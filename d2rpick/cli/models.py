@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of a solver's table besides time_s, by meaning.
+# Columns of a solver's table other than time_s, with their quantities.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),

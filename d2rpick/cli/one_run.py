@@ -177,7 +177,7 @@ def suggest(
         decision = judged_card.worst if judged_card else None
         return output.finish_by_verdict(decision, question.settings.min_quality)
     output.answer(answer)
-    # a given td is answered, however poor it is; only a card must not be used unseen
+    # a given td gets an answer even if it is poor; only a card must not be used without a check
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     return output.finish_by_verdict(answer.decision, min_quality)
 
@@ -476,7 +476,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the cautions of the card that the plan lacks: of unverified windows, and of the card itself."""
+    """Return the cautions of the card that the plan does not contain: on unverified windows, and on the card itself."""
     if card is None:
         return []
     failed = tuple(
@@ -492,7 +492,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Refuse to copy a deck that is not given, or to write a card without parts, before a file is opened."""
+    """Before a file is opened, refuse to copy a deck that is not given, or to write a card without parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -504,7 +504,7 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy of the deck, and check it by the history.
+    """Write the copy of the deck, and check it with the history.
 
     Returns
     -------

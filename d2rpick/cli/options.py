@@ -1,4 +1,4 @@
-"""Make the options of the commands from the tables of requests; write ``--show-settings`` and the line to repeat."""
+"""Make the options of the commands from the tables of requests; write settings and the command line to repeat."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ Decorated = Any  # a command function; click's decorators have no narrower type
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
-HISTORY: Final = "HISTORY"  # stands for the argument, not for the option of that name
+# means the positional argument, not the option with the same name
+HISTORY: Final = "HISTORY"
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, *RESULT)
@@ -75,7 +76,7 @@ class Command(Documented):
     """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line; the settings file fills in what neither it nor the environment gives."""
+        """Read the command line. The settings file gives the options that neither it nor the environment sets."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
@@ -127,8 +128,8 @@ class Command(Documented):
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
-        # Import numpy before the modules of a run: its import makes many nested calls.
-        # Each call may reach the end of a piece of the stack of Python 3.11, which then maps and unmaps memory.
+        # Import numpy before the modules of a run, because its import makes many nested calls.
+        # Python 3.11 keeps its stack in pieces. A call that crosses the end of a piece makes it map and unmap memory.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401
         try:
@@ -138,7 +139,7 @@ class Command(Documented):
 
 
 class Either(click.Option):
-    """An option that excludes others: its environment variable is ignored if the command line has one of those."""
+    """An option that excludes others. If one of them is on the command line, its environment variable is ignored."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -147,7 +148,7 @@ class Either(click.Option):
     def consume_value(
         self, ctx: click.Context, opts: Any
     ) -> tuple[Any, ParameterSource]:
-        """Return the value and its source; click has already done so for all options on the command line."""
+        """Return the value and its source. Options on the command line already have the value that click read."""
         value, source = super().consume_value(ctx, opts)
         typed = (
             ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
@@ -159,14 +160,14 @@ class Either(click.Option):
 
 
 def make_command(function: Decorated) -> click.Command:
-    """Make a command of a function."""
+    """Turn a function into a command."""
     return make_documented(Command)(function)
 
 
 def add_options(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command the options of tables; it gets one object per table, named like its class in lower case.
+    """Give a command the options of the tables. It gets one object per table, named like its class in lower case.
 
     Parameters
     ----------
@@ -240,7 +241,7 @@ def _share_option(
 ) -> Callable[[Decorated], Decorated]:
     """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
     shared_option = decorate(lambda: None).__click_params__[0]
-    again: Any = lambda *_, **__: shared_option  # noqa: E731  click takes what makes an option for its class
+    again: Any = lambda *_, **__: shared_option  # noqa: E731  click accepts a function in place of the option class
     return click.option(cls=again)
 
 
@@ -342,12 +343,10 @@ def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def open_judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; return None without one."""
+    """Open the history with which cards are judged; return None if none is given."""
     if not request.history:
         return None
-    from d2rpick.api.asked import (
-        open_requested_run,
-    )  # imported here since nothing is computed without a history
+    from d2rpick.api.asked import open_requested_run  # imported here to start faster
 
     return open_requested_run(request)
 

@@ -1,4 +1,4 @@
-"""Send results, notes and files of a command where they belong."""
+"""Write the results, notes and files of a command to stdout, stderr or files."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# narrower terminals are ignored [columns]
+# smallest width of a terminal that is used [columns]
 _NARROWEST: Final = 40
-# formats implied by file names
+# formats that the suffixes of file names imply
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
-# formats often expected of a report, but not supported
+# file types that users may expect for a report, but that are not supported
 _PRINTED: Final = (".pdf", ".doc", ".docx")
 # Lines of a result in bold: recommendations, verdicts, and changes of a deck.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
 
 
-# Arguments that messages name in backticks, with their options if these have other names.
+# Options that have other names than the arguments that messages name in backticks.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -73,11 +73,11 @@ _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {
     "table",
     "markdown",
-}  # forms whose answer itself explains why nothing is recommended
+}  # output forms that already explain why nothing is recommended
 
 
 class Verdict(Protocol):
-    """Verdict on a pair of times, on which the exit code rests."""
+    """Verdict on a pair of times, which determines the exit code."""
 
     @property
     def verdict(self) -> str:
@@ -168,7 +168,7 @@ class Output:
         return output
 
     def check(self, cards: Cards, *, by_itself: bool = False) -> None:
-        """Refuse options of a card if none is requested, ``by_itself`` or in a page."""
+        """Refuse card options if no card is requested, either ``by_itself`` or in a page."""
         if cards.given and not (
             by_itself or self.output_format == "card" or self.report is not None
         ):
@@ -177,7 +177,7 @@ class Output:
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
-        """Return what a form shows besides the answer."""
+        """Return what an output form shows in addition to the answer."""
         from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
@@ -207,12 +207,12 @@ class Output:
             self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
-        """Exit with 1 if the answer is an objection, unless ``--exit-zero`` is given."""
+        """Exit with code 1 if the answer is an objection, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(self, decision: Verdict | None, min_quality: str) -> None:
-        """Exit with 1 if there is no pair, or if its grade is below ``min_quality``, which is then named."""
+        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``; a message names the limit."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -224,7 +224,7 @@ class Output:
         self.finish(objection=True)
 
     def spare(self, inputs: Iterable[str]) -> None:
-        """Raise D2RPickError if a file would replace one of further inputs, which are known only after reading."""
+        """Raise D2RPickError if a file would replace one of the inputs that are known only after reading."""
         further = replace(self, inputs=tuple(inputs))
         for name in (self.file, self.plot, self.report):
             if name is not None:
@@ -232,7 +232,7 @@ class Output:
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError if ``name`` cannot be written, is an input, or exists and must not be replaced."""
-        from pathlib import Path  # imported here: --help does not need it
+        from pathlib import Path  # imported here to start faster
 
         path = Path(name)
         if path.is_dir():
@@ -288,7 +288,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print the omissions of a reader, and the warnings."""
+        """Print the notes of a reader on omissions, and the warnings."""
         if self.quiet:
             return
         for note in notes:
@@ -311,7 +311,7 @@ class Output:
 
 
 def _check_report(name: str | None) -> None:
-    """Raise D2RPickError if the file name of a report promises another format than HTML."""
+    """Raise D2RPickError if the file name of a report implies a format other than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
@@ -343,7 +343,7 @@ def _find_implied_format(name: str) -> str | None:
 
 
 def measure_columns(stream: TextIO) -> int | None:
-    """Return the width of the terminal behind a stream, limited to a readable width; None without a terminal."""
+    """Return the width of a stream's terminal, limited to a readable width; None if it is not a terminal."""
     columns_set = os.environ.get("COLUMNS", "")
     try:
         if columns_set.isdecimal():
@@ -364,9 +364,7 @@ def tell(message: str) -> None:
     """
     text = make_printable(replace_arguments(message))
     if is_on_terminal() and (width := measure_columns(sys.stderr)):
-        from d2rpick.report.tables import (
-            wrap_lines,
-        )  # imported here: --help does not need it
+        from d2rpick.report.tables import wrap_lines  # imported here to start faster
 
         text = wrap_lines(text, width)
     click.echo(text, err=True)
@@ -387,12 +385,12 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
 
 def encode_text(text: str) -> bytes:
-    """Encode a text; undecodable bytes of file names are lone surrogates, which no encoding can write."""
+    """Encode a text. File names may contain lone surrogates for undecodable bytes, which no encoding can write."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
 def replace_arguments(message: str) -> str:
-    """Replace the arguments in a message by the options that set them.
+    """Replace the argument names in a message with the options that set them.
 
     Examples
     --------
@@ -408,13 +406,15 @@ def replace_arguments(message: str) -> str:
 
 
 def find_option(argument: str) -> str:
-    """Return the option that sets an argument, empty if there is none."""
+    """Return the option that sets an argument; empty if there is no such option."""
     name = _OTHERS.get(argument, argument)
     return f"--{make_option_name(name)}" if name in ARGUMENTS else ""
 
 
 def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
-    """Replace arguments by options in a result for people, wrapped to ``width`` columns; others keep the arguments.
+    """Replace argument names with options in a result for people, wrapped to ``width`` columns.
+
+    Results for programs keep the argument names.
 
     Examples
     --------
@@ -428,15 +428,13 @@ def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
     text = replace_arguments(text)
     if form != "table" or not width:
         return text
-    from d2rpick.report.tables import (
-        wrap_lines,
-    )  # imported here: --help does not need it
+    from d2rpick.report.tables import wrap_lines  # imported here to start faster
 
     return wrap_lines(text, width)
 
 
 def check_switched(purpose: str, request: Request, cards: Cards) -> None:
-    """Refuse a card that switches no parts, before a file is opened."""
+    """Before a file is opened, refuse a card that switches no parts."""
     if not (request.part or cards.node):
         problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
         way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"

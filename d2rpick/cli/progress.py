@@ -22,7 +22,7 @@ _PERIOD: Final = 1.0  # time before the first line, and between two lines [s]
 def show_reading(
     names: Sequence[str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Show on a terminal how many seconds the reading of ``names`` has taken, unless ``quiet``.
+    """Show on a terminal how long the reading of ``names`` has taken [s], unless ``quiet``.
 
     ``period`` is the time before the first line, and between two lines [s].  The remaining time is unknown: how much of
     a file must be read depends on the question.
@@ -67,7 +67,7 @@ class Count:
 def show_counting(
     total: int, *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[Count]:
-    """Show on a terminal how many runs are finished and the remaining time; the caller counts."""
+    """Show on a terminal how many runs are finished, as counted by the caller, and the remaining time."""
     count = Count(total)
     with show_progress(count.told, quiet=quiet, period=period):
         yield count
@@ -103,7 +103,7 @@ def show_progress(
     if quiet or not is_on_terminal():
         yield
         return
-    from threading import Event, Thread  # imported here: --help does not need it
+    from threading import Event, Thread  # imported here to start faster
 
     done = Event()
     thread = Thread(target=_tell, args=(say, done, period), daemon=True)

@@ -147,7 +147,7 @@ def study(
 
 
 def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
-    """Return the names of all runs, given and listed, with patterns replaced by their matches."""
+    """Return the runs named on the command line and in the list file; patterns are replaced with their matches."""
     from d2rpick.api.studies import find_runs
 
     sources = find_runs([*names, *(_read_list(listed) if listed is not None else ())])
@@ -193,7 +193,7 @@ def _read_list(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # Not splitlines(): names may contain its other line separators.
+    # splitlines() is not used because names may contain other characters at which it splits.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
@@ -215,7 +215,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """Return how many runs are known from an earlier study, and print it."""
+    """Return the number of runs whose rows are taken from an earlier study, and print it."""
     if ledger is None:
         return 0
     known_count = ledger.taking(sources)
@@ -227,7 +227,7 @@ def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) 
 def _choose_farm(
     jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool
 ) -> Farm:
-    """Choose where to compute so many calls; a single call needs no other process."""
+    """Choose where to compute this number of calls; a single call needs no other process."""
     from d2rpick.base import workers
 
     if scheduler and calls:

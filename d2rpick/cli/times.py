@@ -1,4 +1,4 @@
-"""Define options that are times of a run: numbers in its unit, or texts with a unit until that unit is known."""
+"""Define options for times of a run. A time with a unit stays a text until the unit of the run is known."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Commands that compute runs in SI units.
 _IN_SECONDS = ("rollover",)
-# Arguments with the files of one run, and of many.
+# Names of the arguments that contain the files of one run, or of many runs.
 _ONE_RUN = "history"
 _MANY_RUNS = "run"
 # Options that choose the time column and the format.
@@ -24,7 +24,7 @@ _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
 class TimeType(NumberType):
-    """A time of the run: a number, or a text like 64ms, which `convert_typed_times` replaces by a number."""
+    """A time of the run: a number, or a text such as 64ms that `convert_typed_times` replaces with a number."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -39,7 +39,7 @@ class TimeType(NumberType):
 
 
 def convert_typed_times(ctx: click.Context) -> None:
-    """Replace the times of a command that were typed with a unit by numbers in the unit of the run.
+    """Convert the times of a command that were typed with a unit to numbers in the unit of the run.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def _convert(
 
 
 def _find_unit(ctx: click.Context) -> tuple[str, str]:
-    """Return the time unit of the run of a command, empty if it is unknown, and the source that should name it."""
+    """Return the time unit of a command's run (empty if unknown), and the source that should name the unit."""
     if ctx.command.name in _IN_SECONDS:
         return "s", ""
     runs = _list_runs(ctx)

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # generic from click 8.4 on
+    FloatType = click.ParamType  # this class is generic from click 8.4 on
 
 CARDS: Final = tuple(list_options(Cards))
-_PAIR: Final = 2  # values of an option that is a pair
-# Options that apply only together with another one: settings are for all commands, also those that lack these.
+_PAIR: Final = 2  # number of values of an option that is a pair
+# Options that apply only together with another option. A settings file may set them for commands that lack it.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -58,7 +58,7 @@ class NumberType(FloatType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read a number, or fail with the value found and the values allowed."""
+        """Read a number; the error names the value found and the values allowed."""
         try:
             number = float(value)
         except ValueError:
@@ -129,7 +129,7 @@ class CompletedText(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the names with this prefix, without those that a shell would split."""
+        """Offer the names with this prefix, except names that a shell would split."""
         import re
 
         from click.shell_completion import CompletionItem
@@ -151,7 +151,7 @@ class PartNames(Names):
     """Ids and titles of parts, completed from the history on the command line."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
-        """Return the parts of the files on the command line, and the words for several parts."""
+        """Return the parts in the files on the command line, and the words that stand for several parts."""
         run = _open_typed_run(ctx)
         parts = run.parts if run else ()
         words = [
@@ -178,7 +178,7 @@ class RuleIds(CompletedText):
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Offer the rules with this prefix in any case."""
+        """Offer the rules with this prefix, ignoring upper and lower case."""
         return super().shell_complete(ctx, param, incomplete.upper())
 
 
@@ -186,13 +186,13 @@ class ChannelNames(Names):
     """Names of channels, completed from the history on the command line."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
-        """Return the channels of the files on the command line, with underscores for blanks, which are equivalent."""
+        """Return the channels in the files on the command line. Blanks become underscores, which mean the same."""
         run = _open_typed_run(ctx)
         return [(name.replace(" ", "_"), "") for name in (run.channels if run else ())]
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
-    """Open the files on the command line; None if they are not a run."""
+    """Open the files on the command line; return None if they are not a run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -243,7 +243,7 @@ _NAMED: Final = {
 
 
 def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
-    """Return the type by which click reads a kind of value."""
+    """Return the click type that reads a kind of value."""
     if isinstance(kind, str):
         return _NAMED[kind]
     if isinstance(kind, range):
@@ -256,7 +256,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
 def read_settings(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Return the values of options by name from the ``table`` of settings that was read from ``source``.
+    """Return the option values, by name, in the ``table`` of settings that was read from ``source``.
 
     Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
     context with the command line and the environment: settings that these exclude are ignored.
@@ -340,7 +340,7 @@ def _read_value(
         raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
         return converted
-    from pathlib import Path  # imported here: settings rarely contain a file
+    from pathlib import Path  # imported here to start faster
 
     folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
     if has_list:
@@ -354,7 +354,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
         reason = "programs, output files and overwrite are never taken from a file"
     elif (
         not option.expose_value
-    ):  # options that concern a single call, such as --help and --debug
+    ):  # options that concern only one call, such as --help and --debug
         reason = "this is never taken from a file"
     else:
         return

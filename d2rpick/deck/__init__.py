@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
-# Bytes at the start of a file that identify a deck, as titles and comments may precede the keyword.
+# Number of bytes searched to recognise a deck: titles and comments may precede the first keyword.
 _HEAD = 64 * 1024
 
 
@@ -114,7 +114,7 @@ def _has_parts(path: str) -> bool:
 
         return bool(read_parts(read_deck(path)).materials)
     except DeckError:
-        return True  # the reader of the deck reports the error
+        return True  # the code that reads the deck reports the error
 
 
 def _list_includes(path: str) -> list[str]:
@@ -145,7 +145,7 @@ def _list_files(folder: str) -> Iterator[str]:
 def _is_main_deck(path: str) -> bool:
     """Return True if the beginning of a file identifies it as a main deck."""
     try:
-        head = _read_head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
+        head = _read_head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe can be read only once
     except OSError:
         return False
     lines = (
@@ -163,9 +163,9 @@ def _read_head(path: str) -> bytes:
     """
     from d2rpick.deck.source import SourceFile
 
-    with open(path, "rb", buffering=0) as file:  # noqa: PTH123  start-up
+    with open(path, "rb", buffering=0) as file:  # noqa: PTH123  starts faster
         head = file.read(_HEAD)
     try:
         return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
     except DeckError:
-        return head  # the check reports the error
+        return head  # the check of the deck reports the error

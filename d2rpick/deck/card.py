@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 STANDARD, LONG = 10, 20  # width of a field in standard and in long format [characters]
-# Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled on use.
+# Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled at first use.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
@@ -61,12 +61,12 @@ class CardField(NamedTuple):
 
     @property
     def line(self) -> int:
-        """Return the line number in the file; it is counted on request."""
+        """Return the line number in the file; it is computed on request."""
         return self.block.line + self.distance
 
     @property
     def at(self) -> str:
-        """Return file and line as messages show them."""
+        """Return the file and line in the form that messages use."""
         return f"{self.file}:{self.line}"
 
 
@@ -89,7 +89,7 @@ class Value(Generic[T]):
 
     @property
     def field(self) -> CardField:
-        """Return the field itself."""
+        """Return the field from which the value was read."""
         if isinstance(self.place, Row):
             return self.place.field(self.position)
         return self.place
@@ -111,7 +111,7 @@ class Row:
         return not self.text.strip()
 
     def field(self, position: int) -> CardField:
-        """Return field ``position`` (from 0), separated by commas or in fixed columns.
+        """Return the field at the 0-based ``position``; fields are separated by commas or have fixed columns.
 
         It is empty beyond the end of the line.
         """
@@ -125,7 +125,7 @@ class Row:
         return CardField(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
-        """Return the text of a field; all texts of the line are cached, as callers read one field after the other."""
+        """Return the text of a field. The texts of all fields are cached, because callers read one after the other."""
         cells = self._cells
         if cells is None:
             cells = self._cells = [*map(str.strip, self._pieces())]
@@ -156,7 +156,7 @@ class Transform(NamedTuple):
     moved: bool = False
 
     def inside(self, outer: Transform) -> Transform:
-        """Return this transform of a file that a transformed file includes."""
+        """Combine the transform of an included file with the transform of the file that includes it."""
         node, part, material, set_, other_id = (
             offset + outer_offset
             for offset, outer_offset in zip(self[:5], outer[:5], strict=True)
@@ -185,12 +185,12 @@ class Card:
 
     @property
     def line(self) -> int:
-        """Return the line number of the keyword line, from 1."""
+        """Return the 1-based line number of the keyword line."""
         return self.block.line
 
     @property
     def at(self) -> str:
-        """Return file and line of the keyword as messages show them."""
+        """Return the file and line of the keyword in the form that messages use."""
         return f"{self.file}:{self.line}"
 
     @cached_property
@@ -264,7 +264,7 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; None for any other, and for all numbers of an include in other units."""
+        """Read a positive number; None for any other number, and in an include with other units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
@@ -313,7 +313,7 @@ class Scope:
     def __init__(self, outer: Scope | None = None) -> None:
         self._outer = outer
         self._local: _Table = {}
-        # The scope of the main file holds the global parameters.
+        # The scope of the main file contains the global parameters.
         self._whole: Scope = outer._whole if outer else self
         self._shared: _Table = {}
         self._latest_wins = False
@@ -323,7 +323,7 @@ class Scope:
         self._seen = self
 
     def as_of_now(self) -> Scope:
-        """Return this scope as a card at the current position sees it: later definitions do not affect its values."""
+        """Return the scope that applies at the current position; later definitions do not change its values."""
         if self._seen._known != self._whole._count:
             self._seen = Scope(self._outer)
             self._seen._local, self._seen._whole, self._seen._known = (
@@ -351,7 +351,7 @@ class Scope:
         )
 
     def definition(self, name: str) -> Definition | None:
-        """Return the definition that is used; None if there is none yet."""
+        """Return the definition that applies; None if the parameter is not yet defined."""
         earlier = [
             definition
             for definition in self.definitions(name)
@@ -374,7 +374,7 @@ class Scope:
         )
 
     def value(self, text: str) -> Number:
-        """Evaluate a field: a number, a reference or an expression; ExpressionError for other text."""
+        """Evaluate a field: a number, a reference or an expression; raise ExpressionError for other text."""
         text = text.strip()
         if text[:1] == "<" and text[-1:] == ">":
             return evaluate(text[1:-1], self._number)
@@ -465,7 +465,7 @@ class Scope:
 def _read_definitions(
     rows: Sequence[Row], options: set[str]
 ) -> Iterator[tuple[Row, str, str]]:
-    """Yield the row, the name with its type letter, and the value text of each definition on the card."""
+    """Yield the row, the name with its type letter, and the text of the value of each definition on the card."""
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return

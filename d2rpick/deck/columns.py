@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Kind = type[int] | type[float] | type[str]
 Cell = int | float | str
 
-WIDTH: Final = 10  # characters of a field
+WIDTH: Final = 10  # width of a field [characters]
 
 
 class CardColumn(NamedTuple):
@@ -40,7 +40,7 @@ class CardColumn(NamedTuple):
         return line[self.start : self.start + self.width]
 
     def format(self, value: Cell) -> str:
-        """Return a value at the right end of its column."""
+        """Return a value, right-aligned in its column."""
         return f"{value!s:>{self.width}}"
 
     def put(self, line: str, value: Cell) -> str:
@@ -103,7 +103,7 @@ class DataLine:
 
     @property
     def layout(self) -> list[tuple[int, int]]:
-        """Return first character and width of each column."""
+        """Return the first character and the width of each column."""
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
@@ -133,7 +133,7 @@ def cut_fields(line: str) -> list[str]:
 
 
 def write_list(line: DataLine, values: Iterable[Cell]) -> Iterator[str]:
-    """Yield lines that list values, as many on each as the line has columns."""
+    """Yield lines that list values; each line is filled up to its number of columns."""
     columns = list(line)
     cells = list(values)
     for first in range(0, len(cells), len(columns)):

@@ -51,7 +51,7 @@ class ForceTiming(NamedTuple):
 
 
 def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
-    """Return the times of an LS-DYNA pair of sets.
+    """Return the times of a pair of LS-DYNA switch sets.
 
     It makes parts rigid when no force has acted for the wait, and deformable shortly before the next force. OFFSET is
     the distance that the parts fly from td of the first window to the contact after it.
@@ -89,7 +89,7 @@ def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
 
 
 def find_sensor_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
-    """Return the times of a Radioss force sensor: parts are deformable during each force, and for the wait after it.
+    """Return the times of a Radioss force sensor. Parts are deformable during each force and a waiting time after it.
 
     Before the first window and after the last one they are deformable in any case.
 
@@ -124,7 +124,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Return the shortest wait that gives as many windows as planned, with none before its planned start."""
+    """Return the shortest waiting time with the planned number of windows, of which none begins too early."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]

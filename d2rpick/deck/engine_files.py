@@ -12,11 +12,12 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Least number of time steps in a rigid window: the release is at most one step late.
+# Smallest number of time steps in a rigid window, because the release is up to one time step late.
 # Each window has its own limit, so that later windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-_MOST_LEGS = 99  # the names of time histories have two digits for the engine run
+# the names of time history files have two digits for the number of the engine run
+_MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):

@@ -24,9 +24,9 @@ _TOKEN: Final = (  # compiled at first use
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # compiled at first use
-# Levels of nested parentheses: no deck needs more, and the recursion must not exhaust Python's stack.
+# Largest depth of nested parentheses: no deck needs more, and the recursion must not exhaust Python's stack.
 _DEEPEST = 50
-LONGEST = 40  # characters: a longer text is not a number
+LONGEST = 40  # largest number of characters of a number
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -37,7 +37,7 @@ class ExpressionError(Exception):
     """Raised inside the deck reader for a text that is not a number; the message says why."""
 
 
-@lru_cache(4096)  # most fields are blank or 0
+@lru_cache(4096)  # a quick answer, because most fields are blank or 0
 def parse_number(text: str) -> Number:
     """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` without the exponent letter.
 
@@ -99,7 +99,7 @@ def convert_text(
 
 
 def parse_real(text: str) -> float:
-    """Parse a field as a number: a blank gives 0.0, other text NaN."""
+    """Parse a field as a number: a blank gives 0.0, and a text that is not a number gives NaN."""
     try:
         return float(parse_number(text)) if text.strip() else 0.0
     except ExpressionError:
@@ -140,7 +140,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
 
 
 def _round_half_away(x: Number) -> int:
-    """Round to the nearest integer, halves away from zero."""
+    """Round to the nearest integer; halves are rounded away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
@@ -191,7 +191,7 @@ def _divide(x: Number, y: Number) -> Number:
 
 
 def _raise_to_power(x: Number, y: Number) -> Number:
-    """Raise to a power as Fortran does: integers give an integer."""
+    """Raise a number to a power as Fortran does: integers give an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
@@ -322,7 +322,7 @@ def _split_tokens(text: str) -> Iterator[str]:
 
 
 def _check_range(value: Number) -> Number:
-    """Return the value; ExpressionError if it is not finite or too large."""
+    """Return the value; raise ExpressionError if it is not finite or is too large."""
     if isinstance(value, int) and abs(value) >= _INTEGER_LIMIT:
         raise ExpressionError("an integer leaves the 64-bit range")
     if not math.isfinite(value):

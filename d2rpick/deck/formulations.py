@@ -11,7 +11,7 @@ from typing import Final
 from d2rpick.deck.model import Formulation
 
 BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "spring"
-# Integration points in each layer of a shell, by class.
+# Number of integration points in each layer of a shell, by formulation class.
 _IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
 # Radioss, Ishell of quadrilaterals (Altair's public help for /PROP/TYPE1).
@@ -47,7 +47,7 @@ _ELFORM_SHELL: Final = {
 def find_radioss_formulation(
     kind: str, shell: int, triangle: int, solid: int
 ) -> Formulation | None:
-    """Return the formulation of a kind of element in Radioss by the flags of its property; None if it is unknown."""
+    """Return the Radioss formulation of a kind of element from the flags of its property; None if it is unknown."""
     if kind == "shell":
         return _add_layer_points(
             _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
@@ -66,7 +66,7 @@ def find_radioss_formulation(
 
 
 def find_ls_dyna_formulation(kind: str, elform: int) -> Formulation | None:
-    """Return the formulation of a kind of element in LS-DYNA by its ELFORM; None if it is unknown."""
+    """Return the LS-DYNA formulation of a kind of element from its ELFORM; None if it is unknown."""
     if kind == "shell":
         name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
         return _add_layer_points(

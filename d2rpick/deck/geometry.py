@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 _PIECE: Final = (
     1 << 14
-)  # elements processed at once, whose arrays fit into the processor's cache
-# Nodes of each face of a brick, in the order seen from outside.
+)  # number of elements processed at once; their arrays fit into the processor's cache
+# Nodes of each face of a brick, in their order as seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),
@@ -113,7 +113,7 @@ def _compute_step(data: PartData, measured: Sequence[_ElementTotals]) -> float |
 
 
 def _get_depth(kind: str, data: PartData) -> float | None:
-    """Return the factor that turns a size into a volume [length, area or 1]; None if it is unknown."""
+    """Return the factor that converts an element size to a volume [length, area or 1]; None if it is unknown."""
     if kind in _SURFACES:
         return data.section.thickness
     if kind in _LINES:
@@ -329,12 +329,12 @@ def _compute_shares(
     middles = _compute_centres(elements.nodes, coordinates)
     parts, part_index = np.unique(elements.part, return_inverse=True)
     total = np.bincount(part_index, sizes)
-    # Elements without size do not define the position of their part.
+    # Elements of unknown size do not contribute to the position of their part.
     total[total == 0] = np.nan
     first = np.stack(
         [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
     )
-    # Relative to the centre of the part, because digits are lost far from the origin.
+    # Coordinates relative to the centre of the part are used, because digits are lost far from the origin.
     x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
         np.bincount(part_index, sizes * a * b)
@@ -381,7 +381,7 @@ def _combine_shares(
         )
         / size
     )
-    # Ascending: the few watched nodes are searched among the many nodes.
+    # In ascending order, so that the few watched nodes can be looked up among the many nodes.
     nodes = inventory.nodes_by_part[part]
     positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     watched_nodes = inventory.watched[nodes[positions] == inventory.watched]

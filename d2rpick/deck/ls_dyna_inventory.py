@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that can be read: they add no integers in the columns of element and part id.
+# Options of element keywords that can be read, because they add no integers in the columns of the ids.
 _OPTIONS: Final = {
     *(
         "THICKNESS",
@@ -75,7 +75,7 @@ _OPTIONS: Final = {
 }
 # Keywords without elements: they change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
-_TEN: Final = 10  # nodes in the second line of a solid element
+_TEN: Final = 10  # number of nodes in the second line of a solid element
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = (
     "MAT_DAMPER",
@@ -209,7 +209,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
 def find_shared_nodes(
     cards: Sequence[Card], bodies: Mapping[int, int]
 ) -> dict[tuple[int, int], int]:
-    """Find a node for every two parts of different bodies that share one.
+    """Find a shared node for each pair of parts that belong to different bodies and share nodes.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield part and node id for each node of the elements of given parts, in the order of the deck."""
+    """Yield the part id and node id for each node of the elements of given parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
@@ -320,7 +320,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
         kind = card.name.split("_")[1:2]
         fitting = card.name.startswith(
             "ELEMENT_SEATBELT_"
-        )  # slip ring, retractor, sensor and so on
+        )  # seat-belt keywords without elements: slip ring, retractor, sensor and so on
         if (
             card.name.startswith("ELEMENT_")
             and kind
@@ -331,7 +331,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
 
 
 def _is_readable(card: Card) -> bool:
-    """Return True if the elements of a card can be read."""
+    """Return True if d2rpick can read the elements of a card."""
     _, kind, *options = card.name.split("_")
     return kind in _KINDS and set(options) <= _OPTIONS
 
@@ -348,7 +348,7 @@ def _get_id_width(card: Card) -> int:
 def _read_elements(
     card: Card, node_count: int | None = None
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield kind, part ids and node ids of the elements of a card, block by block, with the id offsets of the include.
+    """Yield the kind, part ids and node ids of a card's elements, block by block, with the id offsets of the include.
 
     ``node_count`` is the number of nodes of each element; default: those that define its size.
     """
@@ -375,7 +375,7 @@ def _read_elements(
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
             )
-        # Rows with an element, a part and enough nodes; others belong to options.
+        # Rows with an element, a part and enough nodes are elements; other rows belong to options.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
@@ -427,7 +427,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 
 
 def _read_codes(lines: Lines, fields: Layout) -> Integers:
-    """Return the last of the fields as integers; mostly 0, which needs no parsing."""
+    """Return the last field of each line as integers. Most of them are 0 and need no parsing."""
     start, width = fields[-1]
     if (
         lines.in_columns
@@ -487,7 +487,7 @@ def _build_section(
 
 
 def _read_materials(deck: Deck, parts: DeckParts) -> Iterator[tuple[str, Material]]:
-    """Yield id and material of each *MAT card."""
+    """Yield the id and the material of each *MAT card."""
     for card in deck.named("MAT"):
         if not card.data or card.name.startswith("MAT_ADD"):
             continue

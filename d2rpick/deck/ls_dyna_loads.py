@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
 _PART_ID, _NODE_SET = 3, 4  # values of SSTYP and MSTYP
-# Beginnings of further keywords that connect parts; the connected parts are unknown.
+# Prefixes of further keywords that connect parts; which parts they connect is not read.
 _OTHER_TIES: Final = (
     *(
         "CONSTRAINED_TIED_NODES_FAILURE",
@@ -147,7 +147,7 @@ def _read_supports(deck: Deck) -> Iterator[Hold | str]:
 
 
 def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
-    """Read a line of *BOUNDARY_SPC for a node or a node set; along local axes it is always a support."""
+    """Read a line of *BOUNDARY_SPC for a node or a node set. A constraint along local axes is always a support."""
     nodes = _find_nodes(deck, card, row)
     _, system, *flags = card.numbers(row, SPC)
     fixed = [bool(flag.value) for flag in flags]
@@ -287,7 +287,7 @@ def _read_motion(
 
 
 def _read_gravity(deck: Deck, parts: DeckParts) -> Iterator[Gravity | str]:
-    """Yield the body loads, which act against their axis, or notes.
+    """Yield the body loads, which act against their axis, or notes on loads that cannot be read.
 
     *LOAD_BODY_PARTS restricts all of them to some parts.
     """
@@ -351,7 +351,7 @@ def _read_body_load(
 
 
 def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield id and ordinates of each curve."""
+    """Yield the id and the ordinates of each curve."""
     for card in deck.named("DEFINE_CURVE"):
         if card.data and card.options("DEFINE_CURVE") <= {"TITLE"}:
             row = card.data[0]
@@ -374,7 +374,7 @@ def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 
 def read_joints(deck: Deck) -> Joints:
-    """Return the joints of parts in an LS-DYNA deck; joints of two rigid bodies that may rotate are not included."""
+    """Return the joints of parts in an LS-DYNA deck, except joints that let two rigid bodies rotate."""
     joints = []
     unknown = [
         _describe_card(card) for name in _OTHER_TIES for card in deck.named(name)
@@ -404,7 +404,7 @@ def read_joints(deck: Deck) -> Joints:
 
 
 def _read_tied_contact(deck: Deck, card: Card) -> Joint | None:
-    """Return the joint that a tied contact makes between two parts, or nodes and a part; None for any other contact."""
+    """Return the joint that a tied contact makes between two parts, or between nodes and a part; otherwise None."""
     options = card.options("CONTACT")
     rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
     if not rows or "MPP" in options:

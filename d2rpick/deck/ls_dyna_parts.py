@@ -49,7 +49,7 @@ _FOLLOWED: Final = {
     "TITLE",
 }  # AVERAGED and TITLE add no line
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # value of IRCS of *PART_INERTIA that adds a line
+_ROTATED = 1  # value of IRCS with which *PART_INERTIA has an additional line
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Node sets of each deck, cached.
@@ -68,7 +68,7 @@ NOT_TURNED: Final = {
     16: "tetrahedron with 10 nodes",
     17: "tetrahedron with 10 nodes",
 }
-# Lines of one section, by kind of element.
+# Number of lines of one section, by kind of element.
 _LINES: Final = {
     "SOLID": 1,
     "DISCRETE": 2,
@@ -110,7 +110,8 @@ _ABLE: Final = (
     "NODE_TO_SURFACE",
 )
 _MOST_ROWS = (
-    8  # most rows of a contact or wall without id; more rows may define a second one
+    # largest number of lines of a contact or wall without id; more lines may define a second one
+    8
 )
 
 
@@ -157,7 +158,7 @@ class DeckParts:
         return part in self.materials and self.materials[part] in self.rigid_materials
 
     def members(self, set_id: int) -> tuple[int, ...] | None:
-        """Return the parts of a part set, ascending; None if they are unknown."""
+        """Return the parts of a part set in ascending order; None if they are unknown."""
         part_ids: set[int] = set()
         for current in self.reached(set_id):
             content = self.sets.get(current)
@@ -205,7 +206,7 @@ def read_parts(deck: Deck) -> DeckParts:
 
 
 def find_rigid_materials(deck: Deck) -> Iterator[Card]:
-    """Yield the cards of rigid materials."""
+    """Yield the *MAT cards of rigid materials."""
     cards = deck.named("MAT_RIGID", "MAT_020", "MAT_20")
     return (
         card
@@ -228,7 +229,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        # ATTACHMENT adds one line, as PRINT does.
+        # ATTACHMENT adds one line, like PRINT.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
     # A composite is one part with a material for each ply, none of which makes it rigid.
     if "COMPOSITE" in options:
@@ -326,7 +327,7 @@ def find_set_nodes(deck: Deck, card: Card, number: int) -> frozenset[int] | None
 
 
 def _read_node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
-    """Yield id and nodes of a node set."""
+    """Yield the id and the nodes of a node set."""
     options = card.options("SET_NODE")
     if card.data and options <= _NODE_SET_OPTIONS:
         ids = [
@@ -382,7 +383,7 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
 
 
 def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
-    """Yield id and section of each section of a card."""
+    """Yield the id and the content of each section of a card."""
     kind = card.name.split("_")[1]
     options = card.options(f"SECTION_{kind}")
     rows = card.lines
@@ -408,7 +409,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that are searched for shared nodes, or (``searched`` False) the other ones."""
+    """Return the element cards that are searched for shared nodes, or the other cards if ``searched`` is False."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -433,7 +434,7 @@ class Constraint(NamedTuple):
 
 
 def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
-    """Yield the constraints of the given kinds; the set of nodes is empty if they are unknown."""
+    """Yield the constraints of the given kinds; their set of nodes is empty if the nodes are unknown."""
     for kind in kinds:
         keyword, read_card = _CONSTRAINTS[kind]
         for card in deck.named(keyword):
@@ -446,7 +447,8 @@ def _read_nodal_rigid_bodies(
     """Yield the nodal rigid bodies of a card."""
     options = card.options(_BODY)
     rows = card.lines
-    if options - {"TITLE"}:  # further options add lines, so the keyword has one body
+    # other options add lines, so the keyword defines only one body
+    if options - {"TITLE"}:
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
         body = card.integer(row, NODAL_BODY["PID"])
@@ -489,7 +491,7 @@ def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
 
 
 def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Return the constraints with two nodes on a line: one per line, unless an option adds lines."""
+    """Return constraints between two nodes: one per line, or one per card if an option adds lines."""
     rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _get_first_line(card)
     return (_read_node_list(card, row, kind, NODE_PAIR) for row in rows)
 
@@ -507,7 +509,7 @@ def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Const
 
 
 def _get_first_line(card: Card) -> tuple[Row, ...]:
-    """Return the first line after the line of an id (``_ID``)."""
+    """Return the first line, or the next line if the option ``_ID`` adds a line for an id."""
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
@@ -556,7 +558,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id; without one, the entry with this number in the order of definition.
+        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -1,4 +1,4 @@
-"""Follow LS-DYNA sensors that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
+"""Find when LS-DYNA sensors switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
 
 A control is on or off. Its switches act in turn: when the condition of one is met, the control changes, and the next
 switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # spans of time
-    # Spans in which the force of a contact or wall exceeds a value, by its kind and number; None if unknown.
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
+    # Function that returns the spans in which the force of a contact or wall exceeds a value; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 
 
@@ -84,7 +84,7 @@ def read_controls(deck: Deck) -> Iterator[Control]:
 def follow_control(
     deck: Deck, control: Control, forces: Forces | None, end: float
 ) -> list[Change] | str:
-    """Follow a control from the start to the end of a run.
+    """Return the states of a control from the start to the end of a run.
 
     Parameters
     ----------
@@ -186,7 +186,8 @@ def _find_spans_of_sensor(
     if card.transform.scaled:
         return f"{name}), which is in an include in other units"
     entity = card.integer(row, SENSOR_FORCE["TYPEID"]).value + card.transform.rest
-    if value < 0 or (value == 0 and not above):  # a magnitude never falls below 0
+    # the magnitude of a force never falls below 0
+    if value < 0 or (value == 0 and not above):
         return _ALWAYS if above else ()
     strong = forces(kind, entity, value) if forces else None
     if strong is None:
@@ -197,7 +198,7 @@ def _find_spans_of_sensor(
 def _find_row(
     cards: Sequence[Card], column: CardColumn, number: int
 ) -> tuple[Card, Row] | None:
-    """Return the line with this number in a column, after the id offset of its include, and its card."""
+    """Return the line that has this number in a column (with the id offset of its include), and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )

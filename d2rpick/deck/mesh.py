@@ -31,16 +31,17 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 
-_WIDEST: Final = 240  # columns of the longest line of a mesh
+_WIDEST: Final = 240  # number of columns of the longest line of a mesh
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-_ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines without fixed columns
-# Last column of most ids: a line with a character there is not blank.
+# separator of the fields in lines without fixed columns
+_ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
+# Last column of most ids: a line with a character in this column is not blank.
 _ID_ENDS: Final = 7
-_HIGHEST: Final = 10**17  # larger than any id; a longer number would overflow
+_HIGHEST: Final = 10**17  # upper limit of ids; a longer number would overflow
 NO_NODE: Final = -1  # index of a missing node
-_DENSE: Final = 50_000_000  # largest id up to which a table of all ids is small enough
-NOTHING: Final = -1  # value of a field that is not an id
-# Up to this number of lines all fields are parsed together, since a deck may have a card for each element.
+_DENSE: Final = 50_000_000  # largest id for which a table of all ids is small enough
+NOTHING: Final = -1  # stands for a field that is not an id
+# Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
@@ -172,7 +173,7 @@ def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _parse_integers(field: NDArray[np.uint8]) -> Integers:
-    """Parse a field of digits; 0 for a blank, `NOTHING` for other text."""
+    """Parse a field of digits: a blank gives 0, other text gives `NOTHING`."""
     value = np.zeros(len(field), np.int64)
     is_valid = np.ones(len(field), bool)
     groups = np.zeros(len(field), np.uint8)
@@ -188,7 +189,7 @@ def _parse_integers(field: NDArray[np.uint8]) -> Integers:
 
 
 def _parse_reals(field: NDArray[np.uint8]) -> Reals:
-    """Parse a field of reals; 0 for a blank, NaN for other text."""
+    """Parse a field of real numbers: a blank gives 0, other text gives NaN."""
     blank = (field == _BLANK).all(axis=1)
     texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
     texts = np.where(blank, b"0", texts)
@@ -204,7 +205,7 @@ def _make_id(value: float) -> int:
 
 
 def find_distinct(values: Places) -> Places:
-    """Return the distinct values, ascending; sorting is faster here than hashing."""
+    """Return the distinct values in ascending order; sorting is faster than hashing here."""
     ordered = np.sort(values, axis=None)
     if ordered.size:
         is_first: NDArray[np.bool_] = np.append(True, ordered[1:] != ordered[:-1])
@@ -228,7 +229,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 
 
 class NodeTable:
-    """Nodes of a mesh by index: first those with coordinates, then those that occur in elements only.
+    """Nodes of a mesh by index. Nodes with coordinates come first, then nodes that occur only in elements.
 
     ``ids`` are the node ids by place, shape (nodes,).
 
@@ -263,7 +264,7 @@ class NodeTable:
 
     @cached_property
     def _lookup(self) -> Places:
-        """Return the indices by id, for small ids; faster than a search."""
+        """Return a table of the indices by id, if all ids are small; it is faster than a search."""
         lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
         lookup[self._sorted[::-1]] = self._order[::-1]
         return lookup
@@ -375,7 +376,7 @@ KINDS: Final = {
 def read_elements(
     card: Card, *, damaged: bool = False
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield kind, part ids and node ids of the elements of a card; a missing node is 0.
+    """Yield the kind, part ids and node ids of the elements of a card; a missing node has the id 0.
 
     With ``damaged`` also yield elements whose ids are incomplete.
     """
@@ -424,7 +425,7 @@ def find_parts_within(
 
 
 def _read_element_blocks(starter: Starter) -> Iterator[tuple[int, Integers]]:
-    """Yield part and node ids of elements, block by block; node 0 if their lines cannot be read."""
+    """Yield part ids and node ids of elements, block by block. The node is 0 if the lines cannot be read."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:

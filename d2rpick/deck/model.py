@@ -29,9 +29,10 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-_LAYERS: Final = 3  # integration points through the thickness if the deck does not define them: most shells have 2 to 5
+# assumed number of integration points through the thickness; most shells have 2 to 5
+_LAYERS: Final = 3
 SPRING: Final = "spring"
-# Kinds of elements that a switch of their part does not make rigid.
+# Kinds of elements that stay deformable when their part is switched to rigid.
 DISCRETE: Final = frozenset({SPRING, "seatbelt"})
 
 
@@ -74,7 +75,7 @@ class Joint(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Joints with known parts (``found``), and names of the ties whose parts are unknown.
+    """Joints between known parts (``found``), and names of the ties whose parts are unknown.
 
     ``switched`` are rigid bodies that exist to be switched.
     """
@@ -282,7 +283,7 @@ class Inventory:
         return formulation or Formulation(kind, None, measured=False)
 
     def further_points(self, part: int, kind: str) -> int:
-        """Return the number of integration points of a shell element beyond those of its first layer.
+        """Return the number of integration points of a shell element in the layers after the first.
 
         0 for other elements.
         """
@@ -358,7 +359,7 @@ class Inventory:
     def _held_by(
         self, joints: Sequence[Joint]
     ) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return for each part the parts that these joints connect to it, with the kinds of the joints."""
+        """Return, for each part, the parts that these joints connect to it, with the kinds of the joints."""
         wanted = np.zeros(len(self.coordinates), bool)
         for _, nodes, _ in joints:
             wanted[nodes] = True
@@ -426,7 +427,7 @@ class Inventory:
         return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
     def _discrete(self, part: int) -> bool:
-        """Return True if a part has only springs, which do not form a rigid body but move with one."""
+        """Return True if a part has only springs. Springs form no rigid body, but move with one."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
@@ -456,7 +457,8 @@ class Inventory:
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
         """Count, by part and kind, the elements whose nodes all belong to these parts."""
-        inside = np.append(self._mask(parts), True)  # the last entry stands for NO_NODE
+        # the index NO_NODE refers to the last entry
+        inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:
             _count_elements(

@@ -11,9 +11,11 @@ from d2rpick.deck.ls_dyna_columns import SET, SET_PART_LIST
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-PartSets = Mapping[tuple[int, ...], int]  # id of the set by its parts (ascending)
+# ids of the part sets; the key is the parts in ascending order
+PartSets = Mapping[tuple[int, ...], int]
 NO_SETS: Final[PartSets] = {}
-_MOST_LISTED: Final = 10  # parts that a card lists; more parts become a set
+# largest number of parts that a card lists; more parts become a part set
+_MOST_LISTED: Final = 10
 
 
 def number_sets(
@@ -27,7 +29,7 @@ def number_sets(
 
 
 def name_parts(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
-    """Return ids and kinds (PTYPE) for the parts: the id of their set if there is one."""
+    """Return the ids and kinds (PTYPE) that name the parts: the id of their part set, if there is one."""
     number = part_sets.get(tuple(sorted(parts)))
     return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
 

@@ -45,7 +45,7 @@ _UNTURNED: Final = {
 }
 # Nodes lie in one plane if they deviate from it by less than this fraction of the size of their piece.
 _FLAT: Final = 1e-6
-# A piece below this fraction of the mass of all pieces on springs hardly moves the others.
+# A piece with less than this fraction of the mass of all pieces on springs hardly moves the other pieces.
 _HEAVY: Final = 0.05
 
 
@@ -183,7 +183,7 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds nodes of a piece; fixed rotations are counted if the translations are free."""
+    """Return True if a support holds nodes of a piece. Fixed rotations count only if the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
@@ -193,7 +193,7 @@ def _find_rotating_nodes(inventory: Inventory) -> Mask:
     """Return an array that is True for nodes with rotations."""
     has_rotations = np.zeros(
         len(inventory.coordinates) + 1, bool
-    )  # the last entry stands for NO_NODE
+    )  # the index NO_NODE refers to the last entry
     for elements in inventory.elements:
         if elements.kind not in _UNTURNED:
             has_rotations[elements.nodes] = True
@@ -205,7 +205,7 @@ def _find_rotating_nodes(inventory: Inventory) -> Mask:
 def _find_symmetry_axes(
     inventory: Inventory, members: Places, fixed: Mask
 ) -> frozenset[int]:
-    """Return the axes along which a symmetry plane, or complete fixing, holds a piece; ``fixed`` is (members, 3).
+    """Return the axes along which a symmetry plane, or fixing of all nodes, holds a piece; ``fixed`` is (members, 3).
 
     The piece lies on one side of the plane, all its nodes on the plane are fixed, and gravity does not act along the
     axis.
@@ -244,7 +244,7 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K.
 # The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
 # A load is transmitted first in the stiffest direction, so the period uses the largest lambda.
-# With the trace of K, the sum of all k, it is the lower limit of all periods.
+# The trace of K, the sum of all k, in place of lambda gives the lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):

@@ -18,7 +18,8 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # width of a field [characters]
-LONGEST = WIDTH - 1  # characters of a number: a blank separates it from the next field
+# largest number of characters of a number; a blank separates it from the next field
+LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
 _COMMENT_WIDTH = 78
@@ -97,7 +98,7 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: ``text`` is all of it, and ``files`` has the same text by the file names that the solver expects.
+    """Solver input: the whole ``text``, and ``files`` with the same text under the file names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
@@ -151,7 +152,7 @@ def write_number(value: float, width: int = LONGEST) -> str:
         raise DeckError(
             f"{value:g} cannot be written in {width} columns; give a number that fits"
         )
-    # prefer an exact text, then digits on both sides of the point, then a short text
+    # an exact text is preferred, then digits on both sides of the point, then a short text
     return min(
         fitting,
         key=lambda text: (
@@ -175,7 +176,7 @@ def write_comments(remarks: Sequence[str]) -> Iterator[str]:
 
 
 def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
-    """Return the windows with positive zeros; DeckError unless each begins after the one before."""
+    """Return the windows without negative zeros; raise DeckError unless each begins after the previous window."""
     if not windows:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
@@ -194,7 +195,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
-    """Return the distinct ids; DeckError if there are none, or one does not fit into ``digits`` columns."""
+    """Return the distinct ids; raise DeckError if there are none, or if one needs more than ``digits`` columns."""
     if not ids:
         raise DeckError(
             "no id of a part or body to switch was given, expected at least one"

@@ -55,9 +55,11 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-_CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # CODE for no force and for a force
+# CODE that waits for the end of a force, and CODE that waits for a force
+_CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
-_DELETE, _ACTIVATE = 1, 2  # values of NRBF and NCSF for constraints on the parts
+# values of NRBF and NCSF that delete and activate the constraints on the parts
+_DELETE, _ACTIVATE = 1, 2
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
     "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
@@ -92,7 +94,8 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-DEFAULT: Final = "ls-dyna"  # solver for histories whose format belongs to no solver
+# solver for a history whose format does not identify the solver
+DEFAULT: Final = "ls-dyna"
 
 
 def _print_ls_dyna(
@@ -194,7 +197,7 @@ def _print_ls_dyna_contact(
     """
     from d2rpick.deck.contact_timing import (
         find_pair_timing,
-    )  # imported here: other cards do not need it
+    )  # imported here to start faster
 
     windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
@@ -256,7 +259,7 @@ def _number_switch_sets(
 
 
 def _check_printed(texts: Sequence[str]) -> None:
-    """Raise DeckError unless each printed time is later than the one before."""
+    """Raise DeckError unless each printed time is later than the previous time."""
     for text, next_text in pairwise(texts):
         if float(text) >= float(next_text):
             problem = f"two switching times are both {text} in {LONGEST} characters"
@@ -330,7 +333,7 @@ def _print_radioss_sensors(
     """
     from d2rpick.deck.radioss_sensors import (
         invert_spans,
-    )  # imported here: other cards do not need it
+    )  # imported here to start faster
 
     windows, _, _ = _check_run(windows, printing)
     return _print_sensors(
@@ -418,7 +421,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # In the file too, since it may be used without the card.
+    # The note is also written to the file, which may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",

@@ -157,12 +157,12 @@ def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Return True if a body is never rigid; ``unused`` are the main nodes of the bodies that no leg activates."""
+    """Return True if a body is never rigid; ``unused`` has the main nodes of the bodies that no leg activates."""
     return body.node.value in unused and not body.sensor
 
 
 def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
-    """Return a remark if the body joins pieces that are not connected otherwise."""
+    """Return a remark if the body joins pieces that have no other connection."""
     pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
@@ -170,7 +170,7 @@ def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
 
 
 def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Return the parts that do not consist of springs alone, or all parts if each does."""
+    """Return the parts that have elements other than springs, or all parts if none has."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
@@ -281,7 +281,7 @@ def _has_nodes(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
 
 
 class _BodyWriter:
-    """Writes new bodies with ids that no card of the deck has."""
+    """Writes new bodies with ids that no card of the deck uses."""
 
     def __init__(
         self, starter: Starter, inventory: Inventory, groups: NodeGroups
@@ -295,7 +295,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return main node and cards of a new body of given parts, with the velocity and gravity of its main node."""
+        """Return the main node and cards of a new body of given parts, with velocity and gravity for the main node."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")

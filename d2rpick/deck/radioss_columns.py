@@ -10,7 +10,7 @@ from typing import Final
 
 from d2rpick.deck.columns import DataLine, blank, integers, reals, words
 
-_REAL: Final = 20  # characters of a real number
+_REAL: Final = 20  # width of a real number [characters]
 
 # /BEGIN: the version of the input, and a line of units
 BEGIN: Final = DataLine(integers("Invers"))
@@ -26,7 +26,7 @@ BODY_INERTIA: Final = DataLine(reals("Jxx Jyy Jzz", _REAL))
 BODY_PRODUCTS: Final = DataLine(reals("Jxy Jyz Jxz", _REAL))
 BODY_FLAGS: Final = DataLine(integers("Ioptoff Iexpams Ifail"))
 
-# /PART: the line below the title, and a further one of a rigid part (Irigid 1)
+# /PART: the line below the title, and the additional line of a rigid part (Irigid 1)
 PART: Final = DataLine(
     integers("prop_ID mat_ID subset_ID"), reals("Thick", _REAL), integers("Irigid")
 )
@@ -91,7 +91,7 @@ SENSOR_INPUTS: Final = DataLine(integers("sens_ID1 sens_ID2"))
 FORCE_SENSOR: Final = DataLine(
     integers("ID"), words("Dir"), reals("Fmin Fmax Tmin", _REAL)
 )
-# A second number after Tdelay, which the solver does not read
+# A second number after Tdelay on the same line, which the solver does not read
 AFTER_DELAY: Final = DataLine(blank(_REAL), words("number", _REAL))
 
 # /RUN of an engine file
@@ -99,6 +99,6 @@ RUN: Final = DataLine(reals("Tstop", _REAL))
 
 
 def make_radioss_element_line(id_count: int) -> DataLine:
-    """Return a line of elements with this number of ids."""
+    """Return the column layout of an element line with this number of ids."""
     names = " ".join(f"ID{number}" for number in range(1, id_count + 1))
     return DataLine(integers(names))

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # most digits of an id
+_DIGITS = 10  # largest number of digits of an id
 
 # Elements whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {
@@ -51,7 +51,7 @@ WITHOUT_FRAME: Final = {
     "SHEL16",
 }
 _RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe for a co-rotational frame
+_ICOROTATIONAL: Final = 2  # value of Iframe that selects a co-rotational frame
 # Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
 _NOT_TURNED: Final = {
     1,
@@ -76,7 +76,7 @@ def read_blocks(source: SourceFile) -> Iterator[Block]:
 
 
 def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
-    """Yield offset and text of the lines that begin with ``/`` or ``#include``.
+    """Yield the offset and text of the lines that begin with ``/`` or ``#include``.
 
     Lines of a mesh are not looked at one by one.
     """
@@ -151,7 +151,7 @@ class RadiossLeg:
     name: str
     number: int
     stop: Value[float]
-    # Each card with True if it makes bodies rigid, and its main nodes.
+    # For each card: True if it makes bodies rigid, and its main nodes.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
     )
@@ -160,11 +160,11 @@ class RadiossLeg:
     starts: list[InitialVelocity] = field(default_factory=list)
     # Sensors that are reset at the start of the leg.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # sensor that ends the leg at an unknown time
+    sensor: int = 0  # id of a sensor that ends the leg at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
-    """Read the legs of a file: one, or several for printed cards in one text."""
+    """Read the legs in a file: one, or several if the text contains several printed engine files."""
     legs: list[RadiossLeg] = []
     waiting: list[Card] = []
     for card in map(make_card, read_blocks(source)):
@@ -301,7 +301,7 @@ class Starter:
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Return the rigid bodies, each with all bodies that are merged into it.
+        """Return the rigid bodies; each includes all bodies that are merged into it.
 
         A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
@@ -415,7 +415,8 @@ class Starter:
     @property
     def moved(self) -> bool:
         """Return True if a submodel may offset ids."""
-        return bool(self.named(""))  # //SUBMODEL has no word between its slashes
+        # the keyword //SUBMODEL has no word between its two slashes
+        return bool(self.named(""))
 
     @property
     def transformed(self) -> bool:
@@ -424,19 +425,20 @@ class Starter:
 
     @property
     def unturned(self) -> dict[int, str]:
-        """Return the kind of elements of solids whose stresses do not rotate with a rigid body, by part."""
+        """Return, by part, the element kind of solids whose stresses do not rotate with a rigid body."""
         defaults = [
             _read_isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        isolid, iframe = defaults[0] if defaults else (0, 0)  # the first card is used
+        # if several cards define it, the first card is used
+        isolid, iframe = defaults[0] if defaults else (0, 0)
         solids = (
             card
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
-        # Flags of each property; the line of the flags may be blank.
+        # The flags of each property are read; their line may be blank.
         flags = {
             get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids
@@ -502,11 +504,11 @@ class Starter:
                 yield part
 
     def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
-        """Return kind and ids of the members of a group."""
+        """Return the kind and the ids of the members of a group."""
         return self.groups.get(group, ("", ()))
 
     def _groups_in(self, group: int) -> tuple[int, ...]:
-        """Return the node groups in a group."""
+        """Return the ids of the node groups in a group."""
         kind, ids = self._group(group)
         return ids if kind == "GRNOD" else ()
 
@@ -519,11 +521,11 @@ def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Return the ids on lines with fields of 10 columns; -1 for text that is not an id."""
+    """Return the ids on lines with fields of 10 columns; a text that is not an id gives -1."""
     cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 
 
 def read_reals(row: Row, columns: Iterable[CardColumn]) -> list[float]:
-    """Read the numbers in columns of a line; 0 for a blank, NaN for text that is not a number."""
+    """Read the numbers in the columns of a line: a blank gives 0, text that is not a number gives NaN."""
     return [parse_real(column.cut(row.text)) for column in columns]

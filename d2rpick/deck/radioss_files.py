@@ -1,4 +1,4 @@
-"""Recognise the files of a Radioss run, and name its possible flaws, as far as readers of LS-DYNA decks need it."""
+"""Recognise the files of a Radioss run, and name its possible flaws, without reading the deck."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ RUINS: Final = {
     LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
-HEAD: Final = 256 * 1024  # bytes at the beginning of a file that identify it
+# number of bytes at the beginning of a file by which it is recognised
+HEAD: Final = 256 * 1024
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# Patterns for files of Radioss are compiled on use.
+# Patterns for Radioss files, compiled at first use.
 STARTER: Final = rb"(?mi)^/BEGIN"
 ENGINE: Final = rb"(?mi)^/RUN/"
 _NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
@@ -59,7 +60,7 @@ def list_run_files(path: str) -> list[str]:
     file of another name belongs to the run that it names in /BEGIN or /RUN.
     """
     try:
-        if not os.path.isfile(path):  # noqa: PTH113  start-up
+        if not os.path.isfile(path):  # noqa: PTH113  starts faster
             return []  # a pipe can be read only once
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
             # reading into a buffer larger than the file takes ten times as long
@@ -69,7 +70,7 @@ def list_run_files(path: str) -> list[str]:
         from pathlib import Path  # imported here to start faster
 
         folder = Path(path).parent
-        file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects: there may be many runs
+        file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects for many runs
     except (OSError, ValueError):
         return []  # the reader of the file reports the error
     name = _find_run_name(path, head)
@@ -91,7 +92,7 @@ def find_root(path: str) -> str:
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.
     """
-    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
+    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  starts faster
     return numbered[1] if numbered else ""
 
 

@@ -97,7 +97,7 @@ class NodeGroups:
 
 
 def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
-    """Return the flaws of a run whose rigid bodies with these main nodes are switched, or kept off.
+    """Return the flaws of a run in which the rigid bodies with these main nodes are switched, or kept off.
 
     A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
     """
@@ -123,7 +123,8 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
         for flaw in _check_wall(wall, starter, groups, bodies)
     ]
     flaws += [*_check_starts(run, groups, bodies)]
-    if not run.deck.unread:  # otherwise an unread include may contain a velocity
+    # otherwise an include that was not read may contain a velocity
+    if not run.deck.unread:
         flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))
 
@@ -208,7 +209,7 @@ def _find_nodes_near_wall(
         if not (ids == node).any():
             return None
         points[0] = coordinates[ids == node][0]
-    with np.errstate(invalid="ignore", over="ignore"):  # fields that are not a number
+    with np.errstate(invalid="ignore", over="ignore"):  # some fields are not numbers
         distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
         return None
@@ -220,7 +221,7 @@ def _find_nodes_near_wall(
 def _compute_distance(
     kind: str, coordinates: Reals, points: Reals, radius: float
 ) -> Reals | None:
-    """Return the distance of nodes (n, 3) in front of a wall; None if its geometry is incomplete."""
+    """Return the distance of nodes (n, 3) from the front of a wall; None if the geometry is incomplete."""
     offsets = coordinates - points[0]
     if kind == "SPHER":
         return np.asarray(np.linalg.norm(offsets, axis=1) - radius)
@@ -284,7 +285,7 @@ def _check_velocities(
 
 
 def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
-    """Return the node group of an /INIVEL, or the nodes that it lists; neither if it moves nothing at the start."""
+    """Return the node group of an /INIVEL, or the nodes that it lists; both are empty if nothing moves at the start."""
     kind = "".join(card.name.split("/")[1:2])
     rows = card.rows[1:]
     if kind == "NODE":

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchWindow
 
 
-# Laws whose lines begin with density, Young's modulus and Poisson's ratio.
+# Material laws whose lines begin with density, Young's modulus and Poisson's ratio.
 _ELASTIC: Final = {
     *(
         "ELAST",
@@ -106,7 +106,7 @@ _AREA_LINE: Final = {
     "TYPE3": 2,
     "TRUSS": 0,
     "TYPE2": 0,
-}  # number of the line with the area, below the title
+}  # number of the line below the title that contains the area
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {
     "SPR_GENE",
@@ -125,7 +125,7 @@ _OTHER_SPRINGS: Final = {
 _OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
 _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 
-# Further keywords that connect parts; the connected parts are unknown.
+# Further keywords that connect parts; which parts they connect is not read.
 _OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
 _AXES: Final = "XYZ"
@@ -162,7 +162,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     notes = (*_collect_notes(run, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _find_joints(run, starter)
-    # Without an engine file all bodies may be switched.
+    # If there is no engine file, all bodies may be switched.
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}
     rigid = _find_always_rigid(windows) | find_parts_of_fixed_bodies(run)
     return Inventory(
@@ -273,7 +273,7 @@ def _find_always_rigid(windows: Sequence[SwitchWindow]) -> set[int]:
 
 
 def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
-    """Yield id and material of each /MAT."""
+    """Yield the id and the material of each /MAT."""
     for card in starter.named("MAT"):
         if len(card.words) < 3:
             continue
@@ -302,7 +302,7 @@ def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
 
 
 def _collect_properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
-    """Yield id and property of each /PROP, with the defaults of /DEF_SHELL and /DEF_SOLID."""
+    """Yield the id and the property of each /PROP, with the defaults of /DEF_SHELL and /DEF_SOLID."""
     defaults = {
         card.words[0]: _read_flags(card, card.lines)
         for card in starter.named("DEF_SHELL", "DEF_SOLID")
@@ -367,7 +367,7 @@ def _read_spring_section(rows: Sequence[str]) -> Section:
 
 
 def _read_shell_section(rows: Sequence[str]) -> Section:
-    """Read thickness and integration points of a shell; 0 points mean global integration, counted as one."""
+    """Read the thickness and integration points of a shell; 0 stands for global integration, treated as 1 point."""
     points = SHELL_SECTION["N"].cut(rows[2]).strip() if len(rows) > 2 else None
     if points is None:
         layers = None
@@ -379,7 +379,7 @@ def _read_shell_section(rows: Sequence[str]) -> Section:
 
 
 def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
-    """Return the flags in the first line; 0 for other text."""
+    """Return the flags in the first line; a text that is not a flag gives 0."""
     return [
         card.integer(rows[0], column).value if rows else 0 for column in SOLID_FLAGS
     ]
@@ -459,7 +459,7 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
-    """Read a /BCS; along the axes of a skew it is always a support, unless it fixes all translations."""
+    """Read a /BCS. Along the axes of a skew it always counts as a support, unless it fixes all translations."""
     moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
@@ -533,7 +533,7 @@ def _find_gravity(starter: Starter) -> Iterator[model.Gravity | str]:
 def _read_gravity_card(
     card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]
 ) -> model.Gravity | None:
-    """Read values and nodes of a /GRAV; None if they are unknown. Before its sensor is active, gravity is 0."""
+    """Read the values and nodes of a /GRAV; None if they are unknown. Gravity is 0 until its sensor is active."""
     row = get_lines_below_title(card)[0]
     function, skew, sensor, group = (
         card.integer(row, GRAVITY[name]).value
@@ -563,7 +563,7 @@ def _read_gravity_card(
 
 
 def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield id and ordinates of each function; empty for a function that the deck scales."""
+    """Yield the id and ordinates of each function; there are no ordinates if the deck scales the function."""
     moved = {get_number(card) for card in starter.named("MOVE_FUNCT") if card.words[1:]}
     for card in starter.named("FUNCT"):
         number = get_number(card)
@@ -579,7 +579,7 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
 
 
 # Joints connect parts without shared nodes: ties, and rigid bodies that are always on.
-# While a part is rigid they must be off, as a node cannot belong to two of them
+# They must be off while a part is rigid, because a node cannot belong to two rigid bodies
 # (Altair's help on incompatible kinematic conditions).
 
 

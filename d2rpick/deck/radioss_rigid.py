@@ -129,7 +129,7 @@ def make_rigid_bodies(
 def _add_main_nodes(
     in_deck: Sequence[Body], last_node: Callable[[], int]
 ) -> Iterator[Body]:
-    """Yield the bodies with the main nodes that the starter adds.
+    """Yield the bodies; the main nodes that the starter adds are included.
 
     These are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the order of
     the parts in the deck, as their ids are above all others.
@@ -150,7 +150,7 @@ def _add_main_nodes(
 
 
 def _join_groups(members: Sequence[Group], groups: dict[int, Group]) -> int:
-    """Return the id of a node group that contains all members, and add it to ``groups``."""
+    """Return the id of a node group that contains all members; a new group is added to ``groups``."""
     if not members:
         return 0
     if len(members) == 1 and members[0][0] == "GRNOD":

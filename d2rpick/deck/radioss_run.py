@@ -78,7 +78,7 @@ class RadiossRun:
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """Return the time of the first reset of each sensor (/SENS/RESET) [time]: the start of a leg."""
+        """Return the time of the first reset of each sensor (/SENS/RESET), which is the start of a leg [time]."""
         first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
@@ -89,7 +89,7 @@ class RadiossRun:
 
     @property
     def pushed(self) -> bool:
-        """Return True if rigid walls or given velocities may act on the bodies of the run."""
+        """Return True if rigid walls or initial velocities may act on the bodies of the run."""
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
@@ -194,7 +194,7 @@ class RunWindows:
 
 
 def is_in_order(legs: list[RadiossLeg]) -> bool:
-    """Return True if the legs are complete from the first one on, and each ends at a known time.
+    """Return True if no leg is missing from the first to the last, and each ends at a known time.
 
     No leg may end before the previous one.
     """
@@ -273,7 +273,7 @@ def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
 
 
 def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
-    """Return the parts of a body as units, or the body itself."""
+    """Return the units that a body switches: its parts, or the body itself if its parts are unknown."""
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [
         Unit(node, is_body=True)
     ]
@@ -301,7 +301,7 @@ def _follow_body(
                 and line.to_rigid
                 and events[-1][1].line.to_rigid
             ):
-                events.pop()  # this card repeats the default
+                events.pop()  # a card that repeats the default switches nothing
             events.append((leg_switch.at or 0.0, SwitchEvent(unit, leg_switch, line)))
     return [
         window
@@ -316,7 +316,7 @@ def find_course(
     contacts: Contacts | None,
     forces: Forces | None = None,
 ) -> Course:
-    """Return the course of a run for the sensors that switch the parts."""
+    """Return what is known of a run that the sensors of its bodies depend on."""
     has_contacts = (
         contacts is not None
         and parts
@@ -372,7 +372,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return the parts that belong completely to the group of each body: named by it, or with all nodes in it.
+    """Return, for each body, the parts that its group names, or whose nodes all belong to the group.
 
     Parameters
     ----------
@@ -393,12 +393,12 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Another part may use nodes of the named parts, as a skin does.
+    # Another part, such as a skin, may use nodes of the named parts.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
     if incomplete:
-        from d2rpick.deck.mesh import find_parts_within  # imported here: it loads numpy
+        from d2rpick.deck.mesh import find_parts_within  # imported here to start faster
 
         for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
@@ -506,7 +506,7 @@ def find_left_rigid(
 
 
 def _list_body_names(bodies: Sequence[Body]) -> str:
-    """Return the names of bodies: by their ids, or by the parts of rigid parts."""
+    """Return the names of bodies, which contain their ids, or the part id of a rigid part."""
     ids = [body.id for body in bodies if body.id]
     parts = sorted(body.part for body in bodies if body.part)
     names = [f"/RBODY {', '.join(format_ranges(ids))}"] * bool(ids)

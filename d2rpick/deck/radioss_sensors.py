@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # spans of time
-    # Spans in which the force of an interface or rigid wall acts, by its kind and number; None if unknown.
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
+    # Function that returns the spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
 # Input version from which a time sensor has an end (Tstop).
 STOPS_SINCE: Final = 2023
-NEVER: Final = 1e20  # later times are never reached
+NEVER: Final = 1e20  # times from this value on are treated as never reached
 # Kinds of force sensors, with the names of their force in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
-# Types of /INTER without contact force on a flying body: ties, fluids, and parts of other contacts.
+# Types of /INTER that exert no contact force on a flying body: ties, fluids, and parts of other contacts.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
 _SINGLE: Final = (
     1e-6  # relative rounding of the times in a T01 file, which have seven digits
@@ -38,7 +38,7 @@ _SINGLE: Final = (
 
 
 class Course(NamedTuple):
-    """The known course of a run.
+    """What is known of a run: its end, its restarts, and when forces act.
 
     The time of the first reset of each sensor, and the spans in which contact forces act [time].
 
@@ -65,7 +65,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Find when a sensor is active: spans (from, to) in order, or a text that says what cannot be followed.
+    """Find when a sensor is active: time spans in order, or a text that says what cannot be evaluated.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.
@@ -117,7 +117,7 @@ def find_active_spans(
 def _find_forced_spans(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
-    """Follow a force sensor: active from the force (or Tmin later) to Tdelay after the force."""
+    """Find when a force sensor is active: from the force (or Tmin later) to Tdelay after the force."""
     keyword = starter.sensors[number].words[1]
     name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
     if len(rows) < 2:
@@ -148,7 +148,7 @@ def _find_forced_spans(
 def find_contacts_of_sensor(
     starter: Starter, number: int, course: Course
 ) -> Spans | None:
-    """Return when the forces act for which a sensor, or one of its inputs, waits [time].
+    """Return the spans in which the forces act that a sensor, or one of its inputs, waits for [time].
 
     None if it waits for none, or if no history shows it.
     """
@@ -182,7 +182,7 @@ def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
 
 
 def has_only_one_force(starter: Starter) -> bool:
-    """Return True if a deck has only one contact or rigid wall, so that the momenta show the force of that one."""
+    """Return True if a deck has only one contact or rigid wall. Its force can then be found from the momenta."""
     contacts = [
         card
         for card in starter.named("INTER")

@@ -69,7 +69,7 @@ _KEPT: Final = (
     *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-# Both are relative to the folder of the main deck.
+# Both paths are relative to the folder of the main deck.
 _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
@@ -78,13 +78,13 @@ _LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled at first use
 # Keywords that seem to be switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # largest number of nested includes
+_DEEPEST = 60  # largest depth of nested includes
 _MOST_FILES = 10_000
 _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Engine keywords that need values: a file that ends with one of them alone is truncated.
+# Engine keywords that need values: a file whose last line is only such a keyword is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -119,7 +119,7 @@ class Restart(NamedTuple):
 def _read_include_card(
     card: Card,
 ) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
-    """Yield for each file of an ``*INCLUDE`` card its name, its transform, and unreadable fields of the transform.
+    """Yield, for each file of an ``*INCLUDE`` card, its name, its transform and the transform's unreadable fields.
 
     ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
     """
@@ -194,7 +194,7 @@ def _read_transform(
 
 def _get_folder(file: str) -> Path:
     """Return the folder of a file."""
-    from pathlib import Path  # imported here: only decks with includes need it
+    from pathlib import Path  # imported here to start faster
 
     return Path(file).parent
 
@@ -222,8 +222,8 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    long: bool = False  # True if the main file ends in long format
-    restarts: dict[str, Restart] = field(default_factory=dict)  # restarts by file
+    long: bool = False  # True if the main file is in long format at its end
+    restarts: dict[str, Restart] = field(default_factory=dict)  # restarts by file name
 
     @property
     def files(self) -> list[str]:
@@ -240,7 +240,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards by name and by each beginning of the name before an ``_``, as rules request both."""
+        """Return the cards by name and by each prefix of the name before an ``_``, because rules request both."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):
@@ -258,7 +258,7 @@ class Deck:
 
     @property
     def silencing(self) -> list[Card]:
-        """Return the cards with a comment before them that silences rules."""
+        """Return the cards that follow a comment that silences rules."""
         return [
             card
             for card in self._all
@@ -283,7 +283,7 @@ class Deck:
 
 @lru_cache(1024)  # cached, because decks use the same keywords repeatedly
 def _list_stems(name: str) -> tuple[str, ...]:
-    """Return a name and each beginning of it before an ``_``."""
+    """Return a name and each of its prefixes that end before an ``_``."""
     return tuple(
         name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_")
     )
@@ -340,7 +340,8 @@ class _Reader:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        self.folders: list[Path] = []  # folders of *INCLUDE_PATH, in order
+        # folders named by *INCLUDE_PATH, in the order of the cards
+        self.folders: list[Path] = []
         # Files by path, so that a file included twice has one state.
         self.sources: dict[str, SourceFile] = {}
 
@@ -442,7 +443,7 @@ class _Reader:
                 os.fsdecode(name.text.encode("latin-1", "replace")),
             ):
                 path = str(folder / spelling)
-                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
+                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file fails on names that are too long
                     return path
         return None
 

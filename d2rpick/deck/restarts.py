@@ -1,4 +1,4 @@
-"""Join small restart decks of LS-DYNA to a run: their cards switch at the end of the run before them.
+"""Join small restart decks of LS-DYNA to a run; their cards switch at the end of the previous run.
 
 A small restart has no parts. Its *RIGID_DEFORMABLE cards have no time: they act when the restart begins, at the ENDTIM
 of the run before. Source: the vendor's keyword data as published in its Python library.
@@ -27,14 +27,14 @@ _LARGEST: Final = 1 << 20  # largest size of a small restart [bytes]
 def is_restart(path: str) -> bool:
     """Return True if a file is a small restart that switches parts."""
     try:
-        if not os.path.isfile(path) or os.path.getsize(path) > _LARGEST:  # noqa: PTH113, PTH202  start-up
+        if not os.path.isfile(path) or os.path.getsize(path) > _LARGEST:  # noqa: PTH113, PTH202  starts faster
             return False
         with open(path, "rb") as file:  # noqa: PTH123
             if _KEYWORD.encode() not in file.read().upper():
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # the check reports the error
+        return False  # the check of the deck reports the error
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
@@ -54,7 +54,7 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     )
     ends = [_find_end(deck) for deck in (main, *legs)]
     known_ends = [end.value for end in ends if end]
-    # no restart begins at the end of the last run, so that end may be unknown
+    # the end of the last run may be unknown, because no restart begins there
     timed = all(ends[:-1]) and all(
         end_time < next_end_time for end_time, next_end_time in pairwise(known_ends)
     )

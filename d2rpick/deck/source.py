@@ -21,23 +21,27 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# Bytes searched at a time: the buffer is reused and fits into the processor's cache.
+# Number of bytes searched at a time; the buffer is reused and fits into the processor's cache.
 _SEARCHED: Final = 3 << 18
-_HELPERS: Final = 1  # additional threads: bytes are copied in parallel, but only one thread searches at a time
-_ALONE: Final = 4  # pieces that one thread searches before a second one has started
-_LOOKBACK: Final = 32  # bytes before a piece, for blanks before its first mark and for a mark across its border
+# number of additional threads: they copy bytes in parallel, but only one thread searches at a time
+_HELPERS: Final = 1
+# number of pieces that one thread searches before a second thread has started
+_ALONE: Final = 4
+# number of bytes before a piece that are searched too, for a mark or blanks that cross its border
+_LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
 # Offset of a letter that mesh data never contains, so that the search for it is fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 
-_PIECE: Final = 4 << 20  # bytes of whole lines that are processed together
+_PIECE: Final = 4 << 20  # number of bytes of whole lines that are processed together
 # Line ends are counted in this fraction of a piece, which fits into the processor's cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # bytes that are searched for the first line end
-_HEAD: Final = 1024  # bytes of a keyword line that are read
-_BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
+_FIRST: Final = 1 << 16  # number of bytes that are searched for the first line end
+_HEAD: Final = 1024  # number of bytes of a keyword line that are read
+# number of bytes before a keyword that are searched for its comments
+_BEFORE: Final = 4096
 _SILENCE: Final = (
     r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled at first use
 )
@@ -50,7 +54,7 @@ def find_marks(
     alone: int = _ALONE,
     helpers: int = _HELPERS,
 ) -> Sequence[int]:
-    """Return the offsets of each ``*`` at the beginning of a line (after blanks) and of encrypted blocks, ascending.
+    """Return, in ascending order, the offsets of encrypted blocks and of each ``*`` that begins a line (after blanks).
 
     A file of more than ``alone`` pieces of ``piece`` bytes is searched by ``helpers`` additional threads.
     """
@@ -118,7 +122,7 @@ class _Search:
                 else:
                     marks_by_piece[begin] = ()
         self._found |= (
-            marks_by_piece  # only now it is certain that the file has not changed
+            marks_by_piece  # only now is it certain that the file has not changed
         )
 
     def stop(self) -> None:
@@ -128,7 +132,7 @@ class _Search:
             helping.acquire()
 
     def result(self) -> Sequence[int]:
-        """Return all marks; pieces left by a helper are searched here, where errors are raised."""
+        """Return all marks. Pieces that a helper left are searched here, so that errors are raised in this thread."""
         if remaining := [begin for begin in self.pieces if begin not in self._found]:
             self._waiting = iter(remaining)
             self.go_on()
@@ -142,7 +146,7 @@ def _make_compact(offsets: Iterable[int]) -> MutableSequence[int]:
     """Return offsets as an array of 64-bit integers."""
     from array import (
         array,
-    )  # not above: small files use a list
+    )  # not imported at the top of the module, because small files need only a list
 
     return array("q", offsets)
 
@@ -160,13 +164,13 @@ def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Return the next position of a letter after the line that contains ``at``; -1 if there is none."""
+    """Return the position of the next letter after the line that contains ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
 
 def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
-    # A header that continues in the next piece is found there, because that piece begins with the end of this one.
+    # A header that crosses the end of this piece is found in the next piece, which repeats the end of this one.
     """Return the offsets of the headers of encrypted blocks."""
     offsets = []
     at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
@@ -290,11 +294,11 @@ class SourceFile:
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules; always True for a large file, which is not searched for them."""
+        """Return True if comments may silence rules. A large file is not searched for them, so the result is True."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
-        """Return the number (from 1) of the line with the byte at ``offset``."""
+        """Return the 1-based number of the line that contains the byte at ``offset``."""
         nearest = bisect_right(self._counted, (offset, 1 << 62)) - 1
         position, line = self._counted[nearest]
         step = -(-self._piece // _COUNTED)
@@ -323,7 +327,7 @@ class Block:
 
     @property
     def _comment(self) -> tuple[str, ...]:
-        """Return the beginnings of comment lines: ``$``, and for Radioss ``#`` too."""
+        """Return the characters that begin comment lines: ``$``, and in Radioss files also ``#``."""
         return ("$", "#") if self.head.startswith("/") else ("$",)
 
     @cached_property
@@ -332,12 +336,12 @@ class Block:
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Return the data lines without comments, each with its distance to the keyword line."""
+        """Return the data lines without comments, each with the number of lines from the keyword line."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
         if (
             last and self.end is None
-        ):  # otherwise the piece contains the blanks before the next keyword
+        ):  # otherwise the block would contain the blanks before the next keyword
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)
         return [
@@ -348,7 +352,7 @@ class Block:
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:
-        """Return the rule ids, or their beginnings, in ``$ d2rpick: ignore`` comments before the keyword.
+        """Return the rule ids, or prefixes of ids, in ``$ d2rpick: ignore`` comments before the keyword.
 
         Only words directly after the colon are read, so that a reason may follow. A word that is not an id is returned
         too.
@@ -356,7 +360,7 @@ class Block:
         above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
             BYTE_ORDER_MARK
         )
-        # The last element contains the blanks before the keyword.
+        # The last element contains only the blanks before the keyword.
         lines = above.decode("latin-1").split("\n")[:-1]
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):

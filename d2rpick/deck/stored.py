@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Largest file that is kept in memory [bytes]: a deck may have thousands of includes.
 HELD_UP_TO: Final = 1 << 18
-# Least number of bytes read at a time, as the next request is mostly close by.
+# Smallest number of bytes read at a time, because the next request is mostly for nearby bytes.
 _WINDOW: Final = 1 << 16
 # Number of cached pieces: the ends of the large blocks of a deck are read repeatedly.
 _KEPT: Final = 8
@@ -61,7 +61,7 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        self._windows: dict[int, bytes] = {}  # by offset, the oldest first
+        self._windows: dict[int, bytes] = {}  # pieces by offset, the oldest piece first
 
     def read(self, begin: int, end: int) -> bytes:
         """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""
@@ -100,7 +100,7 @@ class DeckOnDisk:
     def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
         done = 0
         wanted = memoryview(room)[: end - begin]
-        while done < len(wanted):  # a single call may return fewer bytes
+        while done < len(wanted):  # one call may return fewer bytes than requested
             count = _read_at(file, wanted[done:], begin + done)
             if not count:
                 raise self._changed()
@@ -141,14 +141,15 @@ def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _open_file(name: str) -> FileIO:
-    """Open a file; DeckError if that fails."""
+    """Open a file; raise DeckError if that fails."""
     try:
-        return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back
+        return open(name, "rb", buffering=0)  # noqa: PTH123  starts faster; the caller closes it
     except FileNotFoundError:
         raise DeckError(
             f"{name}: no such file; check the name and the folder"
         ) from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+    except (OSError, ValueError) as error:
+        # ValueError is raised for a NUL byte in the name
         reason = getattr(error, "strerror", None) or error
         raise DeckError(
             f"{name}: cannot be read ({reason}); check the name and the permissions"

@@ -22,7 +22,7 @@ _FIRST: Final = 901  # first id of new switch sets and part sets, if it is free
 
 
 class Suiting(NamedTuple):
-    """Requirements of a deck on a card; None and False if there are none.
+    """What a deck requires of a card; None and False stand for no requirement.
 
     ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
     switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the
@@ -38,7 +38,7 @@ class Suiting(NamedTuple):
 
 
 def find_suiting(path: str, parts: Collection[int]) -> Suiting:
-    """Return the requirements of a deck on a card that switches given parts.
+    """Return what a deck requires of a card that switches given parts.
 
     Raises
     ------
@@ -86,12 +86,12 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Return True if there are constraints and each belongs to these parts alone, so that all may be deleted."""
+    """Return True if there are constraints and all belong to these parts alone, so that they may be deleted."""
     if not constraints:
         return False
     from d2rpick.deck.ls_dyna_inventory import (
         find_first_parts,
-    )  # imported here: it loads numpy
+    )  # imported here to start faster
 
     cards = find_element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)

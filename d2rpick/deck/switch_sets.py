@@ -43,7 +43,7 @@ def write_deformable_lines(
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Return the parts by their lead part; parts without a lead come first, under 0."""
+    """Return the parts grouped by their lead part; parts without a lead part come first, under 0."""
     leads = _find_leads(ids, printing)
     by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):
@@ -52,7 +52,7 @@ def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]
 
 
 def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
-    """Return the lead part of each part that is merged."""
+    """Return the lead part of each part that is merged into another part's rigid body."""
     if printing.merge is not None:
         return {part: printing.merge for part in ids if part != printing.merge}
     bodies = [[part for part in body if part in ids] for body in printing.bodies]
@@ -60,7 +60,7 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of its pair (``other``) and PAIRED.
+    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of the paired set (``other``) and PAIRED.
 
     ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
     switches. 0 stands for none.

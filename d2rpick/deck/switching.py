@@ -1,4 +1,4 @@
-"""Read the switching cards of LS-DYNA field by field, and follow the rigid windows that cards of any solver make.
+"""Read the switching cards of LS-DYNA field by field, and find the rigid windows that the cards of any solver make.
 
 The cards are *DEFORMABLE_TO_RIGID, its variants, and the restart cards *RIGID_DEFORMABLE.
 
@@ -60,7 +60,7 @@ class Switched(NamedTuple):
     part: Value[int]
     by_set: bool
     to_rigid: bool
-    lead: Value[int] | None = None  # LRB; only on a D2R line
+    lead: Value[int] | None = None  # value of LRB, which only D2R lines have
 
 
 class SwitchHeader(NamedTuple):
@@ -96,9 +96,9 @@ class SwitchSet:
     switched: tuple[Switched, ...]
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
-    part: Value[int] | None = None  # part of *DEFORMABLE_TO_RIGID_INERTIA
+    part: Value[int] | None = None  # id of the part on *DEFORMABLE_TO_RIGID_INERTIA
     restart: Restart | None = (
-        None  # restart that contains the card, if its start is known
+        None  # the restart that contains the card, if the start time is known
     )
 
     @cached_property
@@ -154,7 +154,7 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
 
 
 def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
-    """Yield cards that resemble switching cards but are none, with the probably intended keyword."""
+    """Yield misspelled switching cards, each with the keyword that was probably intended."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
             from difflib import get_close_matches  # imported here to start faster
@@ -164,7 +164,7 @@ def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
 
 
 def _read_simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
-    """Read a card without header."""
+    """Read a switching card that has no header lines."""
     restart = restart if kind == "restart" else None
     rows = card.lines
     if kind == "inertia":
@@ -251,7 +251,7 @@ def _read_automatic(card: Card) -> SwitchSet:
 
 
 def _describe_missing(rows: Sequence[Row]) -> str:
-    """Return which header lines are missing, also if a part line is in their place; empty if none is missing."""
+    """Return which header lines are missing, or replaced by a part line; empty if none is missing."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
@@ -306,7 +306,7 @@ def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
 
 
 def _is_overlong(row: Row) -> bool:
-    """Return True if the digits of TIME1 continue in the columns of TIME2, which is then not a number of its own."""
+    """Return True if the digits of TIME1 continue in the columns of TIME2, so that TIME2 is not a separate number."""
     border = SWITCH_TIMES["TIME2"].position * row.width
     next_field = row.text[border : border + row.width].strip()
     touching = (
@@ -471,7 +471,7 @@ def find_windows(
     windows: list[SwitchWindow] = []
     orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
-        # at equal times the switch back comes first: a window of length 0 is none
+        # at equal times the switch back comes first, so that there is no window of length 0
         unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
@@ -504,7 +504,7 @@ def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
 def follow_unit(
     unit: Unit, events: Iterable[tuple[float, SwitchEvent]]
 ) -> tuple[list[SwitchWindow], list[tuple[float, SwitchEvent]]]:
-    """Return the windows of a unit from its events in order, and the events that find it deformable already."""
+    """Return the windows of a unit from its events in order, and the switches back that find it already deformable."""
     windows: list[SwitchWindow] = []
     orphans: list[tuple[float, SwitchEvent]] = []
     opened: tuple[float, SwitchEvent] | None = None

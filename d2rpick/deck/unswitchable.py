@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # Formulations (ELFORM of *SECTION_SOLID) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
-# *MAT keywords of laws with a stress-free reference, by name and number; a number may have leading zeros.
+# *MAT keywords of laws with a stress-free reference state, by name and number; numbers may have leading zeros.
 _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
@@ -49,7 +49,7 @@ _LAWS_WITH_REFERENCE: Final = {
     ),
     *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
 }
-_TOTAL_STRAIN: Final = {10, 11, 12}  # values of Ismstr of solids
+_TOTAL_STRAIN: Final = {10, 11, 12}  # values of Ismstr for solids
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
@@ -88,9 +88,7 @@ def find_unswitchable_in_ls_dyna(
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
-    from d2rpick.deck.radioss_deck import (
-        get_number,
-    )  # imported here: only Radioss decks need it
+    from d2rpick.deck.radioss_deck import get_number  # imported here to start faster
 
     flowing = {
         get_number(card, 2): card.words[0]
@@ -138,7 +136,7 @@ def _make_flowing(how: str) -> Unswitchable:
 
 
 def _make_with_reference(how: str) -> Unswitchable:
-    """Return the reason for a part whose law keeps a reference."""
+    """Return the reason for a part whose material law keeps a stress-free reference state."""
     return Unswitchable(
         False, f"its law keeps a stress-free reference ({how}), {_GAINS}"
     )

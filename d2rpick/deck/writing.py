@@ -50,7 +50,7 @@ _ONCE = {
     "END",
 }
 
-_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart file only at its end
+_NOT_REPEATED: Final = {"RFILE"}  # a leg writes its restart file only at the end
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
 
 
@@ -133,7 +133,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         )
     for block, sign in find_cuts(
         deck
-    ):  # the added lines would hide the truncation, and complete a truncated number
+    ):  # the added lines would hide that the file is truncated, and could complete a truncated number
         if block.source is deck.sources[0]:
             raise DeckError(
                 f"{deck.path}: {sign} The added cards would hide this: {describe_cure(block)}"
@@ -152,7 +152,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError if the deck switches a part of the printed cards, or uses one of their switch sets."""
+    """Raise DeckError if the deck already switches a part of the printed cards, or uses one of their set ids."""
     sets = read_switching(deck)
     printed_sets = read_switching(printed)
     parts = {
@@ -178,7 +178,7 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
 
 
 def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
-    """Insert cards into the bytes of a main file, before its end mark or at its end; ``file_blocks`` are its blocks."""
+    """Insert cards into the bytes of a main file, before ``*END`` or at its end; ``file_blocks`` are its blocks."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
     *_, last = file_blocks
@@ -190,7 +190,7 @@ def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
-    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
+    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
         if not relative.startswith(os.pardir):
@@ -223,7 +223,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     leg = run.legs[0]
     _refuse_unlike(run.legs)
     starter = run.starter.sources[0].name
-    # The engine looks for a restart file whose name begins like its own.
+    # The engine looks for a restart file whose name begins with the run name of the engine file.
     root = find_root(starter) or leg.name
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
@@ -254,7 +254,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
             for node in find_bodies_kept_off(run.legs)
             if node not in switched_nodes
         ]  # without these lines the bodies would be rigid from time 0
-        # The text of a leg without limit ends with its /RBODY/OFF, which these lines continue.
+        # The text of a leg without time-step limit ends with an /RBODY/OFF; these lines are appended to that card.
         lines = (
             write_numbers(off_nodes)
             if printed_leg.cap is None
@@ -317,7 +317,7 @@ def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
 def _edit_lines(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Yield the changed line as its offset, its end and its new bytes."""
+    """Yield a changed line as the offset of its start, the offset of its end, and its new bytes."""
     card = make_card(block)
     for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
@@ -413,7 +413,7 @@ def read_block(block: Block) -> bytes:
     return content if content.endswith(b"\n") else content + b"\n"
 
 
-# Legs that are chosen while the run is computed.
+# Legs of a driven run, which are chosen while the run is computed.
 
 
 class DrivenDeck(NamedTuple):
@@ -474,7 +474,7 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import find_bodies  # imported here: it loads numpy
+    from d2rpick.deck.radioss_bodies import find_bodies  # imported here to start faster
 
     run = read_run(path)
     if run.starter is None or not run.legs:
@@ -543,7 +543,7 @@ def _read_interval(leg: RadiossLeg) -> float:
 
 
 def _find_second(run: RadiossRun) -> float | None:
-    """Return the length of a second in the time unit of the deck [time]; None if it names none."""
+    """Return the length of a second in the time unit of the deck [time]; None if the deck names no unit."""
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())
     if len(rows) > 3:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
 
-# Terms of the balance by the quantities that contain them.
+# For each quantity: the terms of the energy balance that it already contains.
 _QUANTITIES: Final[Mapping[str, str]] = {
     "kinetic": "kinetic_energy",
     "hourglass": "hourglass_energy",
@@ -37,7 +37,7 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# The total energy of Abaqus is the sum of all energies minus the external work, which is constant.
+# Abaqus's total energy is the sum of all energies minus the external work; this difference is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # Quantities of which at least one is needed to judge the health of a run.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
@@ -54,13 +54,14 @@ _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 # Normalised names of the spring energy: in Radioss, and in LS-DYNA's glstat and the glstat branch of a binout.
 # In tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Springs below this share of the peak internal energy have no energy: single precision and glstat have six digits.
+# A spring energy below this share of the peak internal energy is treated as zero.
+# Single precision and glstat have six digits.
 _NONE: Final = 1e-6
 # Smallest spring energy [energy]: LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
 # Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
 _ADDS_UP: Final = 1e-3
-# Threshold between the factors 0 and 1 of a part in a sum.
+# A part belongs to a sum if its fitted factor, ideally 0 or 1, is above this value.
 _HALF: Final = 0.5
 
 
@@ -108,7 +109,7 @@ def read_momentum(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = float("nan")  # unknown mass, or no motion
+    mass = float("nan")  # the mass is unknown, or nothing moves
     if columns.momentum:
         mass = columns.mass(values) or mass
     return Momenta(
@@ -123,7 +124,7 @@ def read_momentum(database: Legs) -> Momenta | None:
 
 
 def compute_least_masses(momenta: Samples, kinetic: Samples) -> Samples:
-    """Return the smallest masses (k,) with these momenta (n, k, 3) and kinetic energies (n, k)."""
+    """Return the smallest masses (k,) that are possible for these momenta (n, k, 3) and kinetic energies (n, k)."""
     squares = np.sum(momenta**2, axis=2)
     masses = np.divide(
         squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0
@@ -180,10 +181,11 @@ class _Columns:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        self.momentum = False  # True once a momentum was read as the velocity
+        # becomes True if a momentum is read in place of the velocity
+        self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model, as written or the smallest with these momenta, (n, 1, 3)."""
+        """Return the mass of the model: as written, or the smallest possible for these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -225,7 +227,10 @@ class _Columns:
         return stacked
 
     def internal(self) -> Samples | None:
-        """Return the internal energy of the model, preferably a total, as a plain one may belong to some parts."""
+        """Return the internal energy of the model, preferably from a column named as a total.
+
+        Other columns may belong to only some of the parts.
+        """
         for says_so in (is_total_internal_energy, is_internal_energy):
             names = [name for name in self._database.channels if says_so(name)]
             if names:
@@ -275,7 +280,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return name and values (n,) of the energy of springs and dampers; None if it is zero, or the whole energy."""
+    """Return name and values (n,) of the spring and damper energy; None if it is zero, or all of the energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
@@ -303,7 +308,7 @@ def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
 def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies add up to the energy of springs and dampers; () if there is no such set.
+    """Return the parts whose energies add up to the energy of springs and dampers; () if no parts do.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """

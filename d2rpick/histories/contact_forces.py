@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# A force or impulse change below this share of the largest is zero: single precision has seven digits.
+# A force, or change of an impulse, below this share of the largest one is treated as zero.
+# Single precision has seven digits.
 _NOTHING: Final = 1e-6
 
 
@@ -57,7 +58,7 @@ class ContactForce(NamedTuple):
 
     @classmethod
     def of_changes(cls, name: str, time: Samples, values: Samples) -> ContactForce:
-        """Make a contact force from columns (n, k) that may be forces or impulses: both change while the force acts.
+        """Make a contact force from columns (n, k) of forces or impulses; both change while the force acts.
 
         A force that stays at one value is zero, since a contact lets parts vibrate.
         """
@@ -78,14 +79,14 @@ class ContactForce(NamedTuple):
 
     @property
     def tells(self) -> bool:
-        """True if the force acts at some times only."""
+        """True if the force acts at some times but not at all times."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
 def find_force(
     forces: Sequence[ContactForce], kind: str, number: int
 ) -> ContactForce | None:
-    """Return the force of a contact, interface or rigid wall (``kind``) by its number; None if it is not written."""
+    """Return the force of the contact, interface or rigid wall (``kind``) with a number; None if it is not written."""
     head = f"{kind} {number}"
     return next(
         (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None
@@ -114,6 +115,6 @@ def join_contact_forces(
 
 
 def _is_above_round_off(values: Samples) -> NDArray[np.bool_]:
-    """Return an array that is True for states whose values (n, k) exceed round-off of the largest value."""
+    """Return an array that is True for states with values (n, k) above the round-off of the largest value."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

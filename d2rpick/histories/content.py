@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # bytes; a file of up to this size is kept in memory
-_LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
-# Bytes at both ends of a file by which it is recognised after it has grown.
+_HELD: Final = 1 << 24  # largest file that is kept in memory [bytes]
+_LINES: Final = 1 << 16  # number of bytes in which line ends are counted at a time
+# Number of bytes at each end of a file, by which the file is recognised after it has grown.
 _END: Final = 1 << 12
 
 
@@ -103,14 +103,15 @@ class OnDisk(Content):
     """
 
     # Sizes of the chunks that are read at once [bytes].
-    block = 1 << 19  # for many bytes; a power of 2 that fits into the cache
-    # gap between two fields that are read together: a system call costs more
+    # chunk size for requests of many bytes: a power of 2 that fits into the cache
+    block = 1 << 19
+    # largest gap between two fields that are read together, because a system call costs more
     gap = 1 << 13
-    # for few bytes: further requests are mostly for the bytes that follow
+    # chunk size for requests of few bytes: the next request is mostly for the bytes that follow
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
-        from threading import Lock, local  # imported here: most files are small
+        from threading import Lock, local  # imported here to start faster
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
@@ -294,7 +295,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]
-        """Window of each thread, created at the first use: only the states of most files are read."""
+        """Window of each thread, created at the first use because most files need none."""
         from threading import local
 
         return local()
@@ -310,7 +311,7 @@ class Scattered(OnDisk):
     def check(self) -> None:
         """Raise ChangedError unless the file is unchanged or has only grown."""
         try:
-            now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  many files
+            now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  faster for many files
         except OSError:
             raise self._shortened() from None
         if not now.continues(self._state):
@@ -345,7 +346,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
 
 
 def open_content(name: str) -> bytes | OnDisk:
-    """Return the content of a file, as bytes if it is small or not a regular file.
+    """Return the content of a file. A small file, or one that is not a regular file, is returned as bytes.
 
     Raises
     ------
@@ -390,7 +391,7 @@ def count_line_number(data: Content, address: int) -> int:
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each offset, shape (n, width)."""
-    # a view with a field at every offset, so that fetching is plain indexing
+    # an overlapping view with a field at every offset, from which the fields are indexed
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# A restart steps back once; if more than this share of the states steps back, the column is not a time.
+# Largest share of the states at which a time may step back. A restart steps back once; other columns do so often.
 _MOST_BACK: Final = 0.1
-# Significant digits by bytes per number: 24 bits give 7 digits; 17 digits restore every double.
+# Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
 # Output has a gap if an interval is this many times the median interval.
@@ -48,10 +48,11 @@ _PIECE: Final = 1 << 15
 # Databases may belong to one run if this share of the states of the coarser one is at times of the other one.
 # Output intervals may differ, but a solver writes at its own cycles.
 _FEWEST = 0.5
-# Databases of a run end within this many of their longest output intervals, as a killed run lacks some states.
+# End times of databases of one run may differ by this number of output intervals: a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy.
-# The second value is round-off relative to the kinetic energy. In solver files the excess is below 0.1 %.
+# Tolerances for an internal energy of the parts above the energy of the model.
+# The first is relative to the largest energy; in solver files the excess is below 0.1 %.
+# The second is the round-off relative to the kinetic energy.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
@@ -156,7 +157,7 @@ class Database:
 
 
 class Legs:
-    """The legs of one run as one `Database`, by their start; in overlaps the newer leg is used.
+    """The legs of one run, in the order of their start, as one `Database`; in overlaps the newer leg is used.
 
     A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
     are used only if all legs have none.
@@ -169,11 +170,11 @@ class Legs:
         named: Sequence[tuple[str, str]] = (),
         notes: Sequence[str] = (),
     ) -> None:
-        self._cut = cut  # files with truncated packed data
-        self._own_notes = notes  # notes on files that are not read
+        self._cut = cut  # names of packed files that are truncated
+        self._own_notes = notes  # notes on files that were not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # the times of a single leg may be unknown yet
+        if len(legs) > 1:  # the times of a single leg may not be known yet
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
@@ -220,7 +221,7 @@ class Legs:
             elif len(names) == 1:
                 channels[quantity] = names[0]
         for quantity, name in self._named:
-            # another database of the run may have it; otherwise `open_run` raises
+            # another database of the run may have the quantity; if none has it, `open_run` raises the error
             with suppress(FormatError):
                 channels[quantity] = self.find(name)
         return channels
@@ -235,7 +236,7 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and on what was left out between them."""
-        # first, since reading the columns may add notes to the legs
+        # read first, because reading the columns may add notes to the legs
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -260,12 +261,12 @@ class Legs:
 
     @cached_property
     def time(self) -> Samples:
-        """Times of the whole model, increasing."""
+        """Times of the states of the whole model, in increasing order [time]."""
         return self._joined([leg.time for leg in self._legs], self._kept[0])
 
     @cached_property
     def part_time(self) -> Samples:
-        """Times of the parts, increasing."""
+        """Times of the states of the parts, in increasing order [time]."""
         return self._joined([leg.part_time for leg in self._legs], self._parts_kept[0])
 
     def find(self, wanted: str) -> str:
@@ -298,7 +299,7 @@ class Legs:
         return values
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the coarsest leg."""
+        """Return the precisions of the leg with the coarsest numbers."""
         precisions = [leg.precisions(names) for leg in self._legs]
         coarsest_time = min((time for time, _ in precisions), key=_count_digits)
         coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
@@ -336,7 +337,7 @@ class Legs:
     def _order(
         self, times: Sequence[Samples]
     ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        """Return which states are valid, and notes on the others."""
+        """Return which states are valid, and notes on the invalid states."""
         for leg, time in zip(self._legs, times, strict=True):
             back = int(np.count_nonzero(time[1:] < time[:-1]))
             steps = time.size - 1
@@ -389,12 +390,12 @@ def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the digits or decimals of a precision."""
+    """Return the number of decimals of a precision, or else its number of digits."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, in which a leg may be missing."""
+    """Return notes on long intervals without output, where a leg may be missing."""
     if time.size < 4:
         return ()
     pieces = (
@@ -404,7 +405,8 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    if max(longest) <= _LONG * min(shortest):  # the usual case: regular output
+    # the usual case, regular output intervals
+    if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
@@ -448,7 +450,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases with few common printed times, or with different ends."""
+    """Yield a note on each pair of databases that have few printed times in common, or different end times."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue

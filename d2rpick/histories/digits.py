@@ -1,4 +1,4 @@
-"""Round and convert times as a user reads and types them: with six digits, perhaps in another unit."""
+"""Round and convert times in the form in which users read and type them: with six digits, optionally with a unit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 _DIGITS: Final = 6  # significant digits of a printed time
-# Significant digits of a sum of times: more than in files, fewer than in a double.
+# Number of significant digits of a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 
 # Units of time by their names in files and options [s], as texts, because 0.001 is not exact as a double.
@@ -31,12 +31,12 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# Users rarely mean a time in this first share of a record, so it is assumed to have another unit.
+# A time in this first share of a record is assumed to be in another unit.
 _NEVER_MEANT: Final = 0.01
-# If a smaller unit gives a time in this first share, the record was more likely cut before the time.
+# If a smaller unit gives a time in this first share, the record more likely ends before the time.
 _HARDLY_MEANT: Final = 0.05
-# Users rarely mean a td with fewer states before it, which shows no period and hardly saves time.
-# A value that is in the record in both units needs at least a thousand states, or lies before the second state.
+# A td with fewer states before it is assumed to be in another unit, because such a td hardly saves time.
+# A value within the record in both units needs at least 1000 states, unless it lies before the second state.
 _FIRST_STATES: Final = 10
 
 
@@ -52,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the time, or its printed form if that is earlier.
+    """Return the time, or the printed time if it is earlier.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def round_down_as_read(time: float) -> float:
 
 
 def format_window(start: float, end: float) -> str:
-    """Format a window so that every printed time between its ends is inside; very short windows with all digits.
+    """Format a window so that every printed time between its ends is inside. Very short windows get all digits.
 
     Examples
     --------
@@ -185,7 +185,9 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Ask whether an argument outside a ``record`` (n,) was given in a smaller unit; empty if not.
+    """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit.
+
+    It is empty if that does not explain the value.
 
     The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
     than its length is assumed to be in the unit of the record.
@@ -209,7 +211,10 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Ask whether an argument at the first states of a ``record`` (n,) in ms or us was given in s; empty if not."""
+    """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s.
+
+    It is empty if that does not explain the value.
+    """
     values = convert_to_unit_of_record(record, times, unit)
     return _ask_for_unit("s", argument, values) if values else ""
 
@@ -239,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # us first: if both units fit, the value in ms would be too early in the record
+    # us is tried first: if both units fit, the value in ms would be too early in the record
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -253,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Ask whether an argument was meant in a unit, with the values to give instead."""
+    """Return the question whether an argument was meant in a unit, with the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

@@ -37,7 +37,7 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-_HEAD: Final = 1 << 16  # bytes that contain the complete legend
+_HEAD: Final = 1 << 16  # number of bytes that contain the complete legend
 
 
 class _Rows(NamedTuple):
@@ -101,7 +101,7 @@ def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Return the line with the largest force at each time: both sides have the same force, or one has none."""
+    """Return the line with the largest force at each time. Both sides have the same force, or one side has none."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
@@ -115,7 +115,7 @@ def _read_contact_rows(data: bytes) -> _Rows:
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the lines of an rwforc; the normal force replaces missing components as the first one."""
+    """Read the lines of an rwforc. If the components are missing, the normal force is the first component."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]
@@ -125,7 +125,7 @@ def _read_wall_rows(data: bytes) -> _Rows:
 
 
 def _read_titles_of_legend(head: bytes) -> dict[int, str]:
-    """Return the titles in the legend by number."""
+    """Return the titles in the legend, by contact number."""
     legend = re.search(_LEGEND, head)
     entries = re.findall(_ENTRY, legend[0]) if legend else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}

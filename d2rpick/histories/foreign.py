@@ -66,7 +66,7 @@ _DYNA_DATABASES: Final = (
     ),
 )
 _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# A keyword at the start of a line, of LS-DYNA or of a starter or engine file of Radioss.
+# Pattern of a keyword at the start of a line, in an LS-DYNA deck or a Radioss starter or engine file.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
@@ -78,7 +78,7 @@ class ForeignFormat(NamedTuple):
     cure: str
 
 
-# Formats recognised by their first bytes, special ones before general ones.
+# Formats recognised by their first bytes; specific formats come before general formats.
 _BINARY_FORMATS: Final = (
     ForeignFormat(
         rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
@@ -222,7 +222,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
-    base_name = os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  start-up
+    base_name = os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  starts faster
     return base_name if base_name in dict(_DYNA_DATABASES) else ""
 
 

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
-# in quotes, because importing numpy.typing slows the start
+# in quotes, because importing numpy.typing slows down start-up
 Samples: TypeAlias = "NDArray[np.float64]"
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Squares of larger energies overflow a double; no system of units has such energies.
+# Largest energy. Squares of larger energies overflow a double, and no system of units has such energies.
 LARGEST_ENERGY: Final = 1e150
-# Parts slower than this share of the fastest one are at rest: single precision leaves them a small speed.
+# Parts slower than this share of the fastest part are at rest. Single precision leaves them a small speed.
 _STILL: Final = 1e-6
 # Number of times whose energies are interpolated together, so that the work arrays stay small.
 _TOGETHER: Final = 1 << 14
@@ -112,7 +112,7 @@ class Momenta:
         return copy
 
     def of(self, members: Sequence[int]) -> Samples:
-        """Return the sum over the parts with these indices, shape (n, 3), read-only."""
+        """Return the sum of the momenta of the parts with these indices, shape (n, 3), read-only."""
         return _sum_momenta(self, *members)
 
     def noise(self, members: Sequence[int]) -> float:
@@ -134,7 +134,7 @@ class Momenta:
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
-        """Return the largest range over the record of a momentum component of one of these parts [momentum]."""
+        """Return the largest variation of any momentum component of these parts over the record [momentum]."""
         lowest, highest = self._bounds
         return float((highest - lowest)[list(members)].max())
 
@@ -145,7 +145,7 @@ class Momenta:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the parts whose momentum components are not all one constant number."""
+        """Indices of the parts that move: their momentum components are not all the same constant number."""
         lowest, highest = self._bounds
         return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
 
@@ -170,7 +170,7 @@ def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at ``time``, arrays of shape (n,); None for terms that the files do not contain.
+    """Energies of the whole model at ``time``, shape (n,); None for terms that the files do not contain.
 
     ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
     damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
@@ -224,7 +224,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """Evidence of flights in the files of a run, other than the energy of the parts.
+    """Data in the files of a run, other than the energy of the parts, that show flights.
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
@@ -330,7 +330,7 @@ class History:
 
     @property
     def balance(self) -> Balance | None:
-        """Energies of the whole model, as far as they are known."""
+        """Energies of the whole model, as far as the files contain them."""
         return self.evidence.balance
 
     @cached_property
@@ -356,8 +356,8 @@ class History:
 
     @property
     def left_beside(self) -> str:
-        """A question about later legs in the same folder that were not named; empty if there are none."""
-        # imported here: pathlib slows the start
+        """A question to the user about later legs in the same folder that were not named; empty if there are none."""
+        # imported here to start faster
         from d2rpick.histories.source import find_later_legs
 
         legs = find_later_legs(self.source)
@@ -392,7 +392,7 @@ class History:
         """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
         if (
             times[-1] * 1e3 > self.time[-1]
-        ):  # the usual case: only times below 1/1000 of the record are checked further
+        ):  # the usual case; only times below 1/1000 of the record need a further check
             return
         from d2rpick.histories.digits import ask_for_larger_unit
 
@@ -410,7 +410,8 @@ class History:
         """Return the energy at ``time``, linear between the states; outside, RangeError names ``argument``."""
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        cell = slice(index, index + 2)  # numpy would copy complete read-only arrays
+        # a slice, because numpy would copy the whole read-only array
+        cell = slice(index, index + 2)
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
@@ -443,7 +444,7 @@ class History:
 
 
 def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Return a record with selected states: of all its arrays with one row per time, except part masses."""
+    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
     size = record.time.size
     rows = {}
     for record_field in fields(record):
@@ -455,7 +456,7 @@ def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
 
 
 def freeze(values: ArrayLike) -> Samples:
-    """Return values as a read-only array of doubles, copied unless they already are a complete one."""
+    """Return values as a read-only array of doubles; they are copied unless they already are a complete one."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

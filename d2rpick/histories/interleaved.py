@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# An energy belongs to several parts if its variation within a time exceeds that between times by this factor.
-# Coarsely printed times give a single energy equal variations; noise gives at most one per row.
+# An energy belongs to several parts if it varies more within one time than between times, by this factor.
+# With coarsely printed times the two variations of a single energy are equal.
+# With noise, the first is at most the second times the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 
@@ -32,7 +33,7 @@ def is_of_several_parts(time: Samples, energy: Samples) -> bool:
 
 
 def find_part_column(columns: Mapping[str, Sequence[object]], rows: int) -> str | None:
-    """Return the first column that has the same ``rows`` different values at each time; None if none has.
+    """Return the first column with the same set of ``rows`` different values at each time; None if there is none.
 
     Examples
     --------

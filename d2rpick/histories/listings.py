@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # Patterns are compiled at their first use by the functions of `re`, to start faster.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
-# Bytes at both ends of an engine listing: the input is at the start, the date of the run at the end.
+# Numbers of bytes read at the start (the input) and at the end (the date of the run) of an engine listing.
 _HEAD, _TAIL = 1 << 20, 1 << 16
 _SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
 _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
@@ -33,14 +33,14 @@ _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 _FIXED: Final = (2026, 1, 13)  # date of the fix of the energy of switched elements
-# Commits of the last weeks before the fix, which may have been built in the year of the fix.
+# Commits of the last weeks before the fix. An engine built from them may show the year of the fix.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
     "9e0e860 26e6573 0905ab7 96c6242 055fbad 9344188 cdf7934 49ecd10 eb51543 c2cb8fa 534623f 46f299a 8de64c8 43562a9 "
     "0260a03 d136353 7ca05a4 abdd714 0fd23b1 898ac63 9e2cfb1"
 )
-_SHORT: Final = 7  # digits of an abbreviated commit
+_SHORT: Final = 7  # number of digits of an abbreviated commit hash
 
 WITH_AN_ERROR: Final = "with an error"
 # Texts at the end of Radioss' engine listing, and of LS-DYNA's messag and d3hsp.
@@ -72,7 +72,7 @@ _STEP: Final = (
 )
 _TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
 _ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-_SEARCHED: Final = 64 << 20  # bytes at the start of a file that are searched
+_SEARCHED: Final = 64 << 20  # number of bytes at the start of a file that are searched
 _D3HSP: Final = "d3hsp"
 
 
@@ -115,7 +115,7 @@ def find_ending(history: str) -> str | None:
 def _read_ends(path: str) -> tuple[bytes, bytes]:
     """Return the first and the last bytes of a file; empty if it cannot be read."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123  start-up
+        with open(path, "rb") as stream:  # noqa: PTH123  starts faster
             head = stream.read(_HEAD)
             stream.seek(max(os.fstat(stream.fileno()).st_size - _TAIL, 0))
             return head, stream.read()
@@ -140,7 +140,7 @@ def _detect_old_engine(head: bytes, tail: bytes) -> str:
 
 
 class Timing(NamedTuple):
-    """Cycles of a leg of a run, and CPU times of the whole leg and of its elements [s]."""
+    """Number of cycles of a leg, and the CPU times of the whole leg and of its elements [s]."""
 
     name: str
     cycles: int
@@ -202,7 +202,7 @@ def is_glstat(path: str) -> bool:
 
 
 def _read_listing(path: str) -> bytes:
-    """Return the bytes of a file; raise FormatError if it cannot be read."""
+    """Return the bytes of a file; raise FormatError if the file cannot be read."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123
             return stream.read()
@@ -213,7 +213,7 @@ def _read_listing(path: str) -> bytes:
 
 
 def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing, 0 for a missing number."""
+    """Return the CPU times of a Radioss listing; a missing number gives 0."""
     summary = data[data.rindex(_SUMMARY) :]
     numbers = []
     for pattern in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES):
@@ -241,13 +241,13 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
 def find_printed_steps(
     run: OpenedRun, *neighbours: str
 ) -> dict[int, tuple[float, str]]:
-    """Return the smallest time step of each part, with the name of its source.
+    """Return the smallest time step of each part, and the name of its source.
 
     Parameters
     ----------
     run : Run
         Its glstat is searched.
-    *beside : str
+    *neighbours : str
         Files whose folders are searched for a d3hsp too.
 
     Returns
@@ -293,7 +293,7 @@ def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float
 
 
 def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
-    """Return part id and step, 0 for a truncated step."""
+    """Return the part id and the time step; a truncated time step gives 0."""
     try:
         return int(part), float(step)
     except ValueError:

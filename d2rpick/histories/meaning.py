@@ -24,7 +24,8 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match, best first: only the quantity; with words for the whole model; with words for something else.
+# Ranks of a match, the best first. The name contains only the quantity, or also words for the whole model,
+# or also words for something else.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -42,13 +43,13 @@ _WHOLE_MODEL_WORDS: Final = frozenset(
 _ENERGY_WORDS: Final = frozenset(
     {"energy", "energies", "energie", "energien", "energia", "energias", "energi", "energii", "energiya", "en"}
 )  # fmt: skip
-# Words that may be added to the name of a time of states; "wall", "cpu" and "step" may not.
+# Words that may occur in the name of the time of the states; "wall", "cpu" and "step" may not occur.
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
 # "2. Kinetic energy", "Curve 2: KE"
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
-_SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
+_SOURCE: Final = re.compile(r"t\d\d")  # a time history file of Radioss, such as T01
 # Last components of a path whose group names the quantity: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
 # Datasets next to the values that are not quantities.
@@ -56,13 +57,13 @@ _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "c
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
-# Letters with accents, which files often lose.
+# Letters with accents and their replacements, because files often lose accents.
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
 _LONGEST_PHRASE: Final = 5  # largest number of words in a name of a quantity
 
-# Words that give an internal energy another meaning; KE in capitals only, since "make" contains it too.
+# Words that give an internal energy another meaning. KE must be in capitals, because "make" contains "ke".
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
@@ -76,11 +77,11 @@ _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
 
-_MOST_NAMED: Final = 6  # energies listed in one note
+_MOST_NAMED: Final = 6  # largest number of energies that one note lists
 
 
 class Meaning(NamedTuple):
-    """The meaning of a name: a quantity, the rank of the match, and the words for something else."""
+    """The meaning of a name: a quantity, the rank of the match, and the words that mean something else."""
 
     quantity: str
     rank: int
@@ -116,7 +117,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # "total energy / initial energy" is a name with a slash, not a path
+    # not a path but a name with a slash, such as "total energy / initial energy"
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -195,7 +196,7 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of names that mean internal energy without other words, or else of all that mean it.
+    """Return the indices of the names that mean only internal energy, or else of all names that mean it.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -207,7 +208,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
             continue
         is_other = re.search(
             _OTHER_QUANTITY, name
-        )  # such as "dissipated internal energy"
+        )  # the name of another quantity, such as "dissipated internal energy"
         if meaning.rank == EXACT:
             exact.append(index)
         elif meaning.rank == WHOLE_MODEL or not is_other:
@@ -263,14 +264,14 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words for the owner of the only internal energy; () if there are several, or no such words."""
+    """Return the words that name the owner of the only internal energy; () if there are several, or no such words."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
 
 
 def _is_bare_total(name: str) -> bool:
-    """Return True if a name is "total", perhaps with a word for energy."""
+    """Return True if a name is "total", with or without a word for energy."""
     words = _split_words(name.rpartition("/")[2])
     words = [word for word in words if word not in _ENERGY_WORDS]
     return words == ["total"]
@@ -308,7 +309,8 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    if normalise_name(name) == ROTATION_ENERGY:  # contained in the kinetic energy
+    # this term is contained in the kinetic energy
+    if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)
     if meaning is not None:

@@ -1,4 +1,4 @@
-"""Interpret the names of columns, units and parts, and which of them the user selects."""
+"""Interpret the names of columns, units and parts, and find those that the user selects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ENERGY_UNITS = frozenset(
      "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
-# A unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
+# Pattern of a unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
 _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
@@ -41,7 +41,7 @@ INTERNAL_ENERGY: Final = frozenset(
 )  # fmt: skip
 
 # Names of other quantities of the whole model: energies, momentum, velocity and mass of the moving parts.
-# They come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
+# The names come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
 # The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
@@ -137,7 +137,7 @@ def check_energy_unit(unit: str) -> str:
 
 
 def remove_unit(name: str) -> str:
-    """Return a name without its unit and the word before it; a bracket without a unit stays.
+    """Return a name without its unit and without the word before the unit. A bracket that contains no unit stays.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def match_names(wanted: str, names: Sequence[str]) -> list[int]:
 
 
 def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
-    """Return the one name that is `meant`; raise FormatError, with similar names, if there is none or several.
+    """Return the only matching name; raise FormatError, with similar names, if none or several match.
 
     Examples
     --------
@@ -217,7 +217,7 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question for the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity.
+    """Return a question with the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity.
 
     Without a similar name, the only one that begins with the wanted text is proposed.
 
@@ -284,7 +284,7 @@ class Namesake(Part):
 
     @property
     def name(self) -> str:
-        """Title and number."""
+        """Title and number of the part."""
         return f"{self.title} ({self.id})"
 
 

@@ -38,11 +38,13 @@ __all__ = [
     "open_sources",
 ]
 
-# Bytes that contain the header of a file and more than one state of the longest blocks.
+# Number of bytes that contain the header of a file and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-_LONGEST_LEGEND: Final = 1 << 24  # bytes; the legend of an ASCII database is shorter
-_DIGITS: Final = "0123456789"  # digits of the number of a later file of a family
+# upper limit for the length of the legend of an ASCII database [bytes]
+_LONGEST_LEGEND: Final = 1 << 24
+# characters at the end of the name of a later file of a family
+_DIGITS: Final = "0123456789"
 
 # Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
 _SAME = 0.01
@@ -51,7 +53,7 @@ _COMPARED = 50
 
 
 class Reader(Protocol):
-    """The functions that a module must define to be a reader; a table format also defines ``write``."""
+    """The functions that the module of a reader must define; a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
         """Return True if a file with these first bytes has the format of the reader; never raises."""
@@ -149,14 +151,14 @@ def _reopen(
     input_format: str,
     surroundings: Surroundings,
 ) -> OpenedRun:
-    """Open a run again with other surroundings."""
+    """Open a run again with other external forces (``surroundings``)."""
     return open_sources(sources, selection, input_format).within(surroundings)
 
 
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Group the files of a run by format; return notes on files of a pattern that are left out.
+    """Group the files of a run by format; also return notes on files that match a pattern but are left out.
 
     Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
     later files of a family have the format of its first file.
@@ -202,7 +204,7 @@ def _sort_by_format(
 
 
 def _note_left_out_file(source: Source, refusal: str) -> str:
-    """Return the note on a file that was left out, with the reason from its error."""
+    """Return the note on a file that was left out; the error gives the reason."""
     reason = (
         refusal.removeprefix(f"{source.name}: ")
         .partition(";")[0]
@@ -214,16 +216,16 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats with force-only formats last; raise FormatError if all are."""
+    """Return the formats, those that contain only forces last; raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # the branch gives the best message about missing data
+        # reading the branch raises the error with the best message about missing data
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
 
 def _is_force_listing(source: Source) -> bool:
-    """Return True if a file is a listing of forces; files of families are not searched for them."""
+    """Return True if a file is a listing of forces; files of families are never listings."""
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
@@ -297,7 +299,7 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 
 
 def _detect_format(source: Source) -> str:
-    """Return the format of a file: a binary signature comes first, and a text is a table only if it is nothing else."""
+    """Return the format of a file. Binary signatures come first; a text is a table only if no other format fits."""
     head = _head_of(source)
     is_binary = b"\0" in head
     if is_binary:
@@ -328,7 +330,7 @@ def _detect_format(source: Source) -> str:
 
 def _refuse_foreign(name: str, head: bytes) -> None:
     """Raise FormatError for a file of a known format without an energy history."""
-    # imported here: solver databases do not need it
+    # imported here to start faster
     from d2rpick.histories.foreign import refuse_foreign
 
     refuse_foreign(name, head)
@@ -381,7 +383,7 @@ def check_legs(legs: Sequence[Database]) -> None:
                 are_alike = _is_same_energy(
                     columns(first, shared[0]), columns(second, shared[1])
                 )
-            except FormatError:  # reported when the column is read
+            except FormatError:  # the error is reported when the column is read
                 continue
             if not are_alike:
                 raise FormatError(
@@ -420,7 +422,7 @@ def _read_part_energies(leg: Database, states: Indices) -> Samples:
 def _find_shared_states(
     first: Samples, second: Samples
 ) -> tuple[Indices, Indices] | None:
-    """Return the states at common times: all if both legs begin together, else the start of the later leg."""
+    """Return the states at common times: all if both legs begin together, else only the start of the later leg."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
         return None
@@ -433,7 +435,7 @@ def _find_shared_states(
 
 
 def _is_same_energy(first: Samples, second: Samples) -> bool:
-    """Return True if energies differ only as after a restart on other processors; NaN is not compared."""
+    """Return True if energies differ no more than after a restart on other processors; NaN values are ignored."""
     if first.shape != second.shape:
         return True
     are_finite = np.isfinite(first) & np.isfinite(second)

@@ -1,4 +1,4 @@
-"""Continue reading growing files: a later read uses the header of a file and its last states only."""
+"""Continue reading growing files: a later read uses only the header of a file and its last states."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class ResumePoint(NamedTuple):
 
     def read_on(self, name: str) -> bytes:
         """Return the header, and the bytes of a file from ``begin`` on; OSError if it cannot be read."""
-        with open(name, "rb") as stream:  # noqa: PTH123  start-up
+        with open(name, "rb") as stream:  # noqa: PTH123  starts faster
             stream.seek(self.begin)
             return self.head + stream.read()
 
     def locate(self, point: ResumePoint) -> ResumePoint:
-        """Return a point that was found in what `read_on` gave with its addresses in the file."""
+        """Convert a resume point in the bytes that `read_on` returned to addresses in the file."""
         skipped = self.begin - len(self.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)

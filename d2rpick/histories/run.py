@@ -74,7 +74,7 @@ class OpenedRun:
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> OpenedRun:
-        """Return the same run with other surroundings."""
+        """Return the same run with other external forces (``surroundings``)."""
         return OpenedRun(
             self.sources,
             self.databases,
@@ -92,7 +92,7 @@ class OpenedRun:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with their own histories."""
+        """Parts that have their own histories."""
         holder = self._with_parts()
         return holder.parts if holder else ()
 
@@ -176,7 +176,8 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            return None  # this database cannot show which parts fly together
+            # a database without all momenta cannot show which parts fly together
+            return None
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
         return Momenta(
@@ -191,7 +192,7 @@ class OpenedRun:
 
     @cached_property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are written, in their order, NaN if unknown [mass].
+        """Masses of the parts whose momenta are written, in the order of the momenta; NaN if unknown [mass].
 
         As written, or momentum over velocity along the axis with most momentum; None if neither is written.
         """
@@ -219,7 +220,7 @@ class OpenedRun:
         return np.where(massless, 0.0, ratios)
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
-        """Return the part masses; an unknown mass is the smallest with its momentum and kinetic energy."""
+        """Return the part masses; an unknown mass is the smallest possible for its momentum and kinetic energy."""
         from d2rpick.histories.balance import compute_least_masses
 
         masses = self._masses(momenta, holder)
@@ -264,7 +265,7 @@ class OpenedRun:
 
     @property
     def part_time(self) -> Samples:
-        """Times of the states of single parts [time]."""
+        """Times of the states of the parts with their own histories [time]."""
         return self._holder().part_time
 
     @cached_property
@@ -273,7 +274,7 @@ class OpenedRun:
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
-        # None if the energies are missing in some states
+        # the energies are missing in some states
         energies = give_if_written(lambda: self.part_energies(parts)) if parts else None
         if energies is None:
             return ()
@@ -303,7 +304,7 @@ class OpenedRun:
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Return the mean of the centres of given parts [length]; None if they are not written."""
+        """Return the mean position of the centres of given parts [length]; None if they are not written."""
         components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
@@ -335,10 +336,10 @@ class OpenedRun:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """Return the database with parts; without one, FormatError names what exists instead."""
+        """Return the database with parts; if there is none, FormatError names what exists instead."""
         holder = self._with_parts()
         if holder is None:
-            # the database gives the best message about missing parts
+            # the database raises the error with the best message about missing parts
             self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
@@ -385,7 +386,7 @@ class OpenedRun:
         )
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the whole model without the energy of springs and dampers, unless it is all."""
+        """Return the history of the whole model without the energy of springs and dampers, unless there is no other."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -441,7 +442,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # the database gives the best message about missing channels
+                    # the database raises the error with the best message about missing channels
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
@@ -479,7 +480,7 @@ def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
 
 
 class _Written(Given):
-    """The evidence in the files of a run for given parts, read on request."""
+    """The data in the files of a run that show the flights of given parts, read on request."""
 
     def __init__(
         self,
@@ -527,7 +528,7 @@ class _Written(Given):
 
 
 def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
-    """Return the channels used as energy, and all other internal energies."""
+    """Return the channels used as the energy, and all other channels with an internal energy."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
         return [*(database.find(name) for name in selection.energy), *passed_over]
@@ -554,7 +555,7 @@ def _note_left_out_springs(springs: str) -> str:
 
 
 def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms (n, k) of a summed energy that are not always zero; a single term is returned as it is."""
+    """Add the terms (n, k) of an energy, except terms that are always zero; a single term is returned unchanged."""
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:
         return history

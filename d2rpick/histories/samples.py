@@ -16,16 +16,17 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# If at least this share of the states repeats the time of the state before, a table may have rows for parts.
+# If at least this share of the states repeats the previous time, a table may have a row for each part.
 _REPEATED: Final = 0.49
-FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be accidental
+# smallest number of times: with fewer times, equal times in several rows may be a coincidence
+FEWEST_TIMES: Final = 3
 # Ratio of output intervals before and after a restart; other curves or unsorted tables exceed it.
 _ALIKE = 2.0
-# Number of adjacent windows that are combined into one; eight keep the table small and quick to search.
+# Number of adjacent windows that are combined into one; 8 keeps the table small and quick to search.
 _TOGETHER: Final = 8
-# A root has converged if it moves by less than this share of its time, which is rounding.
+# A root has converged if it moves by less than this share of its time, which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
-HALVINGS: Final = 50  # bisections of a bracket down to rounding
+HALVINGS: Final = 50  # number of bisections that narrow a bracket to the rounding error
 
 
 def find_window(time: Samples, start: float, end: float) -> slice:
@@ -41,12 +42,12 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and last of the times (n,), empty if there are none; they identify a window of a record."""
+    """Return the first and last of the times (n,), which identify a window of a record; empty if there are none."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 
 def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
-    """Return the integral of values (n,) or (n, k) from the first time on, in their shape, by the trapezoidal rule.
+    """Return the cumulative integral of values (n,) or (n, k) from the first time on, by the trapezoidal rule.
 
     Examples
     --------
@@ -62,7 +63,7 @@ def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
 
 
 def compute_median(values: Samples) -> Samples:
-    """Return the median of values (n,) or (n, k) over the first axis; numpy's median imports masked arrays.
+    """Return the median of values (n,) or (n, k) over the first axis, without numpy's slow import of masked arrays.
 
     Examples
     --------
@@ -81,7 +82,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    # the same as mean(), which is slow for few values
+    # gives the same as mean(), which is slow for few values
     t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
@@ -90,7 +91,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
 
 
 def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return which states of a file are valid, and notes on the others.
+    """Return which states of a file are valid, and notes on the invalid states.
 
     A state gives way to any later one at or before its time: of equal printed times the last one is valid, and after
     a restart that steps back the newer leg is.
@@ -199,7 +200,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median of the positive steps (equal printed times are no interval); NaN without any."""
+    """Return the median of the positive time steps; NaN if there are none. Equal printed times are not counted."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 
@@ -236,7 +237,7 @@ def find_crossings(
     turn = np.flatnonzero(np.diff(side[off_level]))
     index_before = off_level[turn]
     index_after = off_level[turn + 1]
-    # if there are samples on the level, the crossing is at the first of them: a share of 1
+    # if samples lie on the level, the crossing is at the first of them, which is a share of 1
     share = np.where(
         index_after == index_before + 1,
         (level - energy[index_before])
@@ -323,7 +324,7 @@ def find_first_above(
 
 
 def merge_times(*times: Samples) -> Samples:
-    """Return all times once, ascending; numpy's function imports numpy.ma, which slows the start.
+    """Return the distinct times in ascending order. The function of numpy would import numpy.ma.
 
     Examples
     --------
@@ -335,7 +336,7 @@ def merge_times(*times: Samples) -> Samples:
 
 
 def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
-    """Return times and values that draw the curve, shape (2, m): all, or the extremes of many intervals.
+    """Return times and values to draw the curve, shape (2, m): all samples, or the extremes in many intervals.
 
     Parameters
     ----------

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# File names of LS-DYNA's d3 families: job name before, and number in the family after the name.
+# File names of LS-DYNA's d3 families: the job name, the name of the family, and the number of the file.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
 # File names of force listings, which are used next to files with energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
-_BLOCK = 1 << 16  # packed bytes unpacked at a time, which become 68 MB at most
-# Smallest similarity of a suggested file name; names with the same suffix are similar already.
+_BLOCK = 1 << 16  # number of packed bytes unpacked at a time; they become at most 68 MB
+# Smallest similarity of a suggested file name. It is high because the same suffix makes names similar.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 
@@ -83,7 +83,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # families are checked whenever they are read
+    families = _open_families(files)  # files of families are checked at each read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -127,7 +127,7 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
 def _look_at_state(name: str) -> FileState | None:
     """Return the state of a regular file; None for anything else."""
     try:
-        status = os.stat(name)  # noqa: PTH116  start-up
+        status = os.stat(name)  # noqa: PTH116  starts faster
     except (OSError, ValueError):
         return None
     if name == STDIN or not stat.S_ISREG(status.st_mode):
@@ -157,7 +157,7 @@ def _report_empty(name: str) -> FormatError:
 
 def _list_files(name: str) -> Sequence[str]:
     """Return the files of a name: a file with the later files of its family, or those of a folder or pattern."""
-    # os.path instead of pathlib, to start faster
+    # os.path is used instead of pathlib to start faster
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113
         return [name, *_list_later_files(name)]
     from pathlib import Path
@@ -191,7 +191,7 @@ def _list_later_files(name: str) -> Sequence[str]:
     if match is None or match["number"]:
         return []
     try:
-        siblings = os.listdir(folder or ".")  # noqa: PTH208  start-up
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  starts faster
     except OSError:
         return []
     numbers: dict[str, int] = {}
@@ -223,7 +223,7 @@ def _list_databases(folder: Path) -> list[str]:
 
 
 def _find_run(file: Path) -> str:
-    """Return the run to which a file belongs by the name of a solver's database; empty for any other file."""
+    """Return the name of the run in the file name of a solver's database; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
     for listed in READERS.values():
@@ -273,7 +273,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question for a similar file name in the folder, or a hint if the name is a time; empty if neither."""
+    """Return a question with a similar file name in the folder, or a hint if the name is a time; otherwise empty."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
@@ -282,7 +282,7 @@ def _suggest_file(name: str) -> str:
         )
     folder, wanted = os.path.split(name)
     try:
-        siblings = os.listdir(folder or ".")  # noqa: PTH208  start-up
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  starts faster
     except OSError:
         return ""
     return suggest_name(wanted, siblings, _LIKENESS)
@@ -295,7 +295,7 @@ def _unpack(name: str, packed: bytes | OnDisk) -> Source:
     data = bytes(packed)
     try:
         if len(data) * bound("RATIO") > bound("UNPACKED"):
-            # check the size before memory is used for the data
+            # the size is checked before memory is used for the data
             _unpack_pieces(name, data, keep=False)
         pieces, cut = _unpack_pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
@@ -358,5 +358,5 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of the leg, 0 without a number."""
     match = _NUMBERED.fullmatch(name)
-    assert match is not None  # the pattern matches any text
+    assert match is not None  # never None, because the pattern matches any text
     return match[1], int(match[2] or 0)

@@ -24,7 +24,7 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
-    """External forces on each part, by part id, and on the whole model, by None.
+    """External forces on each part (key: part id) and on the whole model (key: None).
 
     ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
     accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if
@@ -36,7 +36,7 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Return the possible accelerations of given parts, or of the model; None if they are unknown."""
+        """Return the possible accelerations by gravity of given parts, or of the model; None if they are unknown."""
         accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 
@@ -48,7 +48,7 @@ class Surroundings:
         return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
-        """Return a sentence about the support of given parts, or of the model, at a time; None without any."""
+        """Return a sentence on the support of given parts, or of the model, at a time; None if there is no support."""
         for number in _list_ids(parts):
             for support in self.supports.get(number, ()):
                 if support.start <= time <= support.end:
@@ -61,7 +61,7 @@ class Surroundings:
     def free(
         self, parts: Iterable[Part] | None, time: float
     ) -> tuple[float, float] | None:
-        """Return the interval around ``time`` in which these parts, or the model, have no support; None if held."""
+        """Return the interval around ``time`` without a support of these parts, or of the model; None if supported."""
         start, end = -inf, inf
         for support in self.supports_of(parts):
             if support.start <= time <= support.end:

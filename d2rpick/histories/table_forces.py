@@ -13,7 +13,7 @@ from d2rpick.histories.formats import READERS
 if TYPE_CHECKING:
     from d2rpick.histories.database import Legs
 
-# Words in the names of contact forces in tables; Radioss names them FNX and so on.
+# Words in the names of contact forces in tables; Radioss uses names such as FNX.
 _TOUCHING: Final = (
     r"(?:contact|interface|wall|rcforc|rwforc|ground|barrier|impact(?:or)?)"
 )
@@ -22,7 +22,7 @@ _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
 def find_forces(database: Legs) -> tuple[ContactForce, ...]:
-    """Return the forces of a database; in a table each column named as a contact force is one."""
+    """Return the contact forces of a database; in a table, each column named as a contact force is one."""
     if READERS[database.format].solver:
         return database.contact_forces
     names = [

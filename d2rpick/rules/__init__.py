@@ -41,16 +41,17 @@ _ALL = (
     for value in vars(module).values()
     if isinstance(value, Rule)
 )
-_BY_HISTORY: Final = "D2R2"  # beginning of the ids of rules that need an energy history
-# Smallest similarity of a suggested rule id to a wrong one, from 0 to 1: one additional character.
+# prefix of the ids of the rules that need an energy history
+_BY_HISTORY: Final = "D2R2"
+# Smallest similarity (0 to 1) of a suggested rule id to the wrong id. It permits one additional character.
 _ALIKE: Final = 0.9
-# Rules that report consequences of a wrong unit, by the rule that reports the wrong unit itself.
+# For each rule that reports a wrong unit: the rules that report only consequences of the same mistake.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# A time after the end of the run is outside its history, too: consequences on the same line.
+# A time after the end of the run is also outside the history, so these rules report the same line again.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
@@ -79,7 +80,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
 
 
 class Configuration(NamedTuple):
-    """Rules that are selected, by id or its beginning (``D2R1``), and the severity of single rules.
+    """The selected rules, as ids or prefixes of ids (``D2R1``), and the severities changed for single rules.
 
     ``ignore`` overrides ``select``; an empty ``select`` selects all rules. ``source`` is the settings file. ``notes``
     name settings files that are not used because they belong to another user.
@@ -181,7 +182,7 @@ def read_configuration(
 def _read_rule_names(
     table: Mapping[str, object], key: str, source: str
 ) -> tuple[str, ...]:
-    """Return the list of rule ids under a key."""
+    """Return the rule ids listed under a key of the settings."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
@@ -191,7 +192,7 @@ def _read_rule_names(
 
 
 class CheckedWindow(NamedTuple):
-    """A rigid window without its deck, as there may be thousands: ``place`` is the card that opens it.
+    """A rigid window; ``place`` is the card that opens it. It does not keep its deck in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     """
@@ -237,7 +238,7 @@ def find_configuration(
     ConfigurationError
         If it cannot be read, or names a rule that does not exist.
     """
-    nearest = find_nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has none
+    nearest = find_nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has no folder
     nearest_configuration = read_configuration(
         nearest.table, nearest.source, other_keys
     )
@@ -330,7 +331,7 @@ def _remove_consequences(findings: list[Finding]) -> list[Finding]:
 
 
 def _strip_windows(windows: Iterable[SwitchWindow]) -> Iterator[CheckedWindow]:
-    """Yield the windows without their deck."""
+    """Yield the windows in a form that does not keep the deck in memory."""
     numbers: dict[SwitchSet, int] = {}
     for unit, tr, td, opened, closed in windows:
         opening = numbers.setdefault(opened.by, len(numbers))
@@ -342,7 +343,7 @@ def _strip_windows(windows: Iterable[SwitchWindow]) -> Iterator[CheckedWindow]:
 def _select_rules(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
-    """Return the selected rules for a solver; cached, as there may be thousands of decks."""
+    """Return the selected rules for a solver. The result is cached because there may be thousands of decks."""
     configuration = Configuration(select, ignore)
     wanted = (
         rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)
@@ -380,7 +381,7 @@ def _read_case(
     """Read a deck according to its content: a Radioss run, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
-    if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
+    if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe can be read only once
         from d2rpick.deck.radioss_run import read_run  # imported here to start faster
 
         run = read_run(path, content)

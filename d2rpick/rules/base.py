@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-_BY_FORCE = {1, 2, 3, 4}  # values of CODE that switch by a force
+_BY_FORCE = {1, 2, 3, 4}  # values of CODE for switch sets that wait for a force
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -112,7 +112,7 @@ class Unreadable(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Case:
-    """A deck as input of the rules; ``judge`` is set if there is an energy history to judge windows by."""
+    """A deck as input of the rules; ``judge`` is set if an energy history is available to judge the windows."""
 
     deck: Deck
     judge: HistoryJudge | None = None
@@ -161,7 +161,7 @@ class Case:
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the switches by a force with their course in the history; empty without a history."""
+        """Return the switches by a force, with their switching times in the history; empty without a history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
@@ -198,7 +198,7 @@ class Case:
 
     @cached_property
     def sensed(self) -> tuple[Sensed, ...]:
-        """Return the sets with CODE 5 with their controls; forces need a history, times do not."""
+        """Return the CODE 5 sets with their sensor controls. Only controls that depend on a force need a history."""
         if not any(header.code.value == BY_SENSOR for _, header in self.headers):
             return ()
         from d2rpick.rules.by_sensor import (
@@ -218,7 +218,7 @@ class Case:
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
-        """Return the events that make a known part rigid."""
+        """Return the switches that make a known part rigid."""
         return tuple(
             event
             for event in self.windows.events
@@ -253,7 +253,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # empty for Radioss decks
+        ]  # empty because it applies to LS-DYNA decks only
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -268,7 +268,7 @@ class Case:
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return the formulation of each part of solids whose stresses do not rotate with a rigid body, by part id."""
+        """Return, by part id, the formulation of each solid part whose stresses do not rotate with a rigid body."""
         sections = read_sections(self.deck)
         part_sections = (
             (part, sections.get(number)) for part, number in self.parts.sections.items()
@@ -297,7 +297,7 @@ class Case:
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
         ]
-        # ENDTIM and DT have the same columns.
+        # ENDTIM and DT are in the same columns of their cards.
         return tuple((card, card.real(card.rows[0], DATABASE["DT"])) for card in cards)
 
 
@@ -326,7 +326,7 @@ class RunCase(Case):
         )
 
     def _find_course(self, body: Body) -> Course:
-        """Return the course of the run for the sensor of a body."""
+        """Return the switching times of a body whose sensor follows the run."""
         from d2rpick.deck.radioss_run import (
             find_course,
         )  # imported here to start faster
@@ -358,7 +358,7 @@ class RunCase(Case):
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the bodies that a force sensor switches, with the course in the history."""
+        """Return the bodies that a force sensor switches, with their switching times in the history."""
         from d2rpick.deck.radioss_sensors import (
             find_contacts_of_sensor,
         )  # imported here to start faster
@@ -385,12 +385,12 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end of the last leg as written."""
+        """Return the end time of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
     def switching(self) -> int:
-        """Return the number of cards that switch something: in the legs, of bodies with a sensor, and of rigid
+        """Return the number of switching cards: those in the legs, the bodies with a sensor, and the rigid
         parts.
         """
         bodies = self.run.starter.bodies if self.run.starter else ()
@@ -442,18 +442,18 @@ class RunCase(Case):
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """Return the harmful effects of the starter on the nodes of the bodies that the legs switch."""
+        """Return the harmful effects of starter cards on the nodes of the bodies that the legs switch."""
         if not self.run.named or not self.run.pushed:
             return ()
         from d2rpick.deck.radioss_flaws import (
             find_flaws,
-        )  # imported here: it loads numpy
+        )  # imported here to start faster
 
         return find_flaws(self.run, self.run.named)
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
-        """Return the index of each leg in which something is rigid, with its windows."""
+        """Return the indices of the legs in which a part or body is rigid, each with its windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value

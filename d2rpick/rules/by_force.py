@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # spans of time
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
 
-# By CODE: the owner of the force, and True if the set waits for a force, False if it waits for its end.
+# For each CODE: what exerts the force, and True if the set waits for the force, False if it waits for its end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,7 +34,7 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-_NEVER: Final = 1e20  # no latest time if TIME2 is at least this
+_NEVER: Final = 1e20  # a TIME2 of at least this value sets no latest time
 # Windows below this fraction of the longest one are chatter, not flights.
 _SHORT: Final = 0.1
 
@@ -56,7 +56,7 @@ class Forced(NamedTuple):
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Return the windows of its parts without duplicates, ascending."""
+        """Return the windows of the switched parts in ascending order, without duplicates."""
         return sorted(
             {(window.tr, window.td) for window in self.windows},
             key=lambda pair: pair[0],
@@ -76,7 +76,7 @@ class Forced(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """The contacts for a switch set [time], and the data of the history that show them."""
+    """The time spans of the contact force that switches a set [time], and the data from which they were found."""
 
     contacts: Spans
     source: str
@@ -85,7 +85,7 @@ class _Seen(NamedTuple):
 def follow_forced_switches(
     deck: Deck, events: Sequence[SwitchEvent], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
-    """Yield the switches by a force in an LS-DYNA deck with their windows; nothing if the history shows no contacts."""
+    """Yield the switches by a force in an LS-DYNA deck, with their windows; none if the history shows no contacts."""
     by_card = {
         event.by: [unit_event for unit_event in events if unit_event.by is event.by]
         for event in events
@@ -138,7 +138,7 @@ def follow_forced_switches(
 def _see_contacts(
     deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
 ) -> _Seen | None:
-    """Return the contacts for a set, from written forces, or from part momenta if the deck has one contact.
+    """Return the contact spans for a set, from written forces, or from part momenta if the deck has only one contact.
 
     For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
     the contacts, and for a contact whose force triggers no switch (D2R008).
@@ -176,7 +176,7 @@ def _can_trigger(deck: Deck, header: SwitchHeader) -> bool:
 def find_spans_of_force(
     deck: Deck, judge: HistoryJudge, kind: str, number: int, least: float = 0.0
 ) -> Spans | None:
-    """Return when the written force of a contact or rigid wall exceeds ``least`` [force] [time].
+    """Return the time spans [time] in which the written force of a contact or rigid wall exceeds ``least`` [force].
 
     Files name a contact by its id, or by its order if it has none.  Some name rigid walls by their order in any case:
     if there are several and their ids differ from their order, none is used.
@@ -184,7 +184,7 @@ def find_spans_of_force(
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)
     if entity is None:
-        # a file of switching cards alone defines no contacts
+        # a file that contains only switching cards defines no contacts
         alone = not entities.found and number > 0
         return judge.find_force_spans(kind, number, least) if alone else None
     name = entity.id or entity.number
@@ -199,7 +199,7 @@ def find_spans_of_force(
 
 
 def _has_one_force(deck: Deck) -> bool:
-    """Return True if a deck has at most one contact or rigid wall; a deck of switching cards alone has none."""
+    """Return True if a deck has at most one contact or rigid wall. A deck with only switching cards has none."""
     return (
         len(read_entities(deck, "CONTACT").found)
         + len(read_entities(deck, "RIGIDWALL").found)
@@ -251,5 +251,5 @@ def _find_pair(
 
 
 def _find_event(unit: Unit, events: Sequence[SwitchEvent]) -> SwitchEvent | None:
-    """Return the event of a unit, or None."""
+    """Return the event that switches a unit, or None."""
     return next((event for event in events if event.unit == unit), None)

@@ -1,4 +1,4 @@
-"""Follow switch sets with CODE 5 through their *SENSOR_CONTROL, by the time and by the forces of a history."""
+"""Find when the *SENSOR_CONTROL of a switch set with CODE 5 switches, from the time and the forces in a history."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # spans of time
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
 
 
 class Sensed(NamedTuple):
-    """A set with CODE 5 and the ``changes`` of its control, or the reason (``unknown``) why they are unknown."""
+    """A switch set with CODE 5, and the times at which its sensor control changes (``changes``).
+    If these times are not known, ``unknown`` gives the reason.
+    """
 
     by: SwitchSet
     changes: tuple[Change, ...] = ()
@@ -28,11 +30,11 @@ class Sensed(NamedTuple):
     def events(
         self, events: Sequence[SwitchEvent]
     ) -> Iterator[tuple[float, SwitchEvent]]:
-        """Yield time and event of each switch: rigid while the control is on, deformable while it is off."""
+        """Yield the time and event of each switch; the parts are rigid while the control is on."""
         set_events = [event for event in events if event.by is self.by]
-        begins_off = self.changes[:1] == (
-            Change(0.0, on=False),
-        )  # a control that begins OFF has nothing to undo
+        begins_off = (
+            self.changes[:1] == (Change(0.0, on=False),)
+        )  # a control that begins OFF finds the parts deformable, so its first OFF switches nothing
         for change in self.changes[begins_off:]:
             for event in set_events:
                 to_rigid = event.line.to_rigid == change.on

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of warnings of ``verify`` that no rule reports, so that the check passes them on.
+# Codes of the warnings of ``verify`` that the check passes on, because no rule reports them.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -59,7 +59,7 @@ _UNKNOWN: Final = "the history does not show when the load ends; give that time 
 
 
 class Fault(NamedTuple):
-    """An objection of an energy history to a window: the rule, the end of the window (td or tr) and the message."""
+    """An objection to a window, based on an energy history: the rule, the time concerned (td or tr) and the message."""
 
     rule: str
     at_td: bool
@@ -68,7 +68,7 @@ class Fault(NamedTuple):
 
 @dataclass
 class HistoryJudge:
-    """Judges windows by a reference run: by the energy of the switched parts, or of the model without parts.
+    """Judges windows by a reference run: by the energy of the switched parts, or of the whole model without part data.
 
     The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
@@ -87,7 +87,7 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def use_deck(self, deck: str) -> None:
-        """Use the supports, gravity and joints of this deck for the next judgements; a deck without parts defines
+        """Use the supports, gravity and joints of this deck for the next judgements. A deck without parts defines
         none.
         """
         try:
@@ -139,7 +139,7 @@ class HistoryJudge:
     def faults(
         self, window: SwitchWindow, together: Iterable[int], *, by_force: bool = False
     ) -> tuple[Fault, ...]:
-        """Return all objections to a window; if it has no td, or td is not after tr, only tr is judged.
+        """Return all objections to a window. If td is missing or not after tr, only tr is judged.
 
         ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
         judged between states of the history.
@@ -191,7 +191,7 @@ class HistoryJudge:
         return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """Return the spans of `contacts` with their uncertainty."""
+        """Return the time spans that `contacts` returns, with their uncertainty."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if chosen:
             momenta = next(
@@ -209,7 +209,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Find when the force of a contact, interface or rigid wall acts [time]; None if it is not written.
+        """Find when the force of a contact, interface or rigid wall acts [time]; None if no file contains the force.
 
         ``least``: only a force above it counts [force].
         """
@@ -261,7 +261,7 @@ class HistoryJudge:
             return
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy lock in none, as a note of the reader says: only the flight limits the times.
+            # Parts without energy have no locked-in energy (a note reports this). Only the flight limits the times.
             yield from (
                 _judge_flight(verdict)
                 if verdict.situation.flight.start is not None
@@ -275,7 +275,7 @@ class HistoryJudge:
 
 
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
-    """Yield the objections that follow from a verdict; a pair that is not admissible has at least one of severity
+    """Yield the objections that follow from a verdict. An inadmissible pair has at least one objection of severity
     error.
     """
     situation, decision = verdict.situation, verdict.decision
@@ -289,7 +289,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         yield Fault("D2R209", False, what)
     elif (
         _loses_most(situation)
-        # one finding for one mistake
+        # one mistake yields only one finding
         and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
@@ -348,7 +348,8 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        return  # Without a vibration the energy is that of td at any tr, up to rounding.
+        # Without a vibration the energy at any tr equals the energy at td, apart from rounding.
+        return
     if candidate.sign_match is False:
         quantity = "the deformations at tr and td have opposite directions"
         yield Fault("D2R202", False, f"{quantity}; {_suggest_cure(verdict)}")
@@ -381,7 +382,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Return the cure: a tr that suits this td, a better pair, or where to look for one.
+    """Return the cure: a tr that suits this td, a better pair, or advice on where to look for a pair.
 
     A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
     """

@@ -154,7 +154,7 @@ def _check_fields(case: Case) -> Iterator[Objection]:
 
 
 def _find_unreadable_members(case: Case) -> Iterator[Problem]:
-    """Yield the unreadable fields of all part sets that the switching cards use, directly or through other sets."""
+    """Yield the unreadable fields of all part sets that the switching cards name, directly or through other sets."""
     used = dict.fromkeys(
         line.part.value for card in case.sets for line in card.switched if line.by_set
     )
@@ -441,7 +441,7 @@ def _report_missing_parts(case: Case) -> Iterator[Objection]:
 
 
 def _describe_course(sensed: Sensed) -> str:
-    """Return the text that says when a control is on, or why that is unknown."""
+    """Return a text that says when a sensor control is on, or why that is unknown."""
     if sensed.unknown:
         return f", by {sensed.unknown}; not judged by time"
     changes = sensed.changes
@@ -459,7 +459,8 @@ def _describe_trigger(card: SwitchSet) -> str:
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
     if card.kind == "plain" and not card.switched and not card.count_problem:
-        return ""  # the card only permits switches in a restart
+        # this card switches nothing itself: it only permits switches in a restart
+        return ""
     if card.kind == "plain":
         return "acts at the start of the run"
     if (

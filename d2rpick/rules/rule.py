@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # default file name of an example deck
+MAIN_DECK: Final = "main.k"  # file name of an example deck that has no other name
 
 HEAD = """\
 *KEYWORD
@@ -76,7 +76,7 @@ class Rule(NamedTuple):
     summary: str
     explanation: str
     fix: str
-    # Function of a Case, or of a RunCase if the rule covers Radioss alone.
+    # Function that finds the objections in a Case, or in a RunCase if the rule covers Radioss alone.
     check: Callable[[Any], Iterable[Objection]]
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
@@ -130,7 +130,7 @@ def make_deck(*cards: str) -> Example:
 
 
 def make_window(tr: str, td: str, more: str = "") -> Example:
-    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``, followed by the cards ``more``."""
+    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``. The cards in ``more`` follow."""
     return make_deck(
         write_automatic_card(1, tr, rigid=["1"]),
         write_automatic_card(2, td, deformable=["1"]),
@@ -144,7 +144,7 @@ PASS = Example(GOOD)
 def write_starter_deck(
     group: str = GROUP, body: str = "      1808", more: str = ""
 ) -> str:
-    """Return a starter deck whose only part is one rigid body on a node group; the text ``more`` follows."""
+    """Return a starter deck with one part, which is a rigid body on a node group. The text ``more`` follows."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
 
@@ -152,7 +152,7 @@ def write_starter_deck(
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return the engine files of a run by file name; each leg is its end time and ON, OFF or nothing for /RBODY."""
+    """Return the engine files of a run by file name. A leg is its end time and ON, OFF or nothing for /RBODY."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""

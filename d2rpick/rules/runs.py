@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import RadiossLeg
     from d2rpick.deck.radioss_run import LeftRigid
 
-# Largest time step while rigid, as a fraction of the rigid window: the release is up to one step late.
+# Largest time step as a fraction of the rigid window, because the release is up to one time step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # largest number of main nodes in a message
+_MOST_LISTED = 8  # largest number of main nodes that a message lists
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
@@ -41,13 +41,13 @@ _KEEPS: Final = (
     write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
-)  # with Ikrem 1
+)  # rigid body with Ikrem 1
 # Arguments of a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
 def _write_row(*fields: float | str, width: int = 10) -> str:
-    """Return a line of fields, right-aligned in columns of this width."""
+    """Return a line with the fields right-aligned in columns of this width."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
@@ -59,8 +59,8 @@ _PLACES: Final = "/NODE\n" + "".join(
 
 
 def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
-    """Return a rigid wall at z = 0 that acts on the nodes of group ``added`` and those within ``reach``, less
-    ``left_out``.
+    """Return a rigid wall at z = 0 that acts on the nodes of group ``added`` and on nodes within ``reach``.
+    It does not act on the nodes of group ``left_out``.
     """
     text = (
         "/RWALL/PLANE/3\nground\n"
@@ -112,7 +112,7 @@ def _make_wheel_run(
 
 
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
-    """Return the legs of a run if any of them switches a body, else none: other runs are not judged."""
+    """Return the legs of a run if any of them switches a body. Other runs are not judged and yield no legs."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -354,7 +354,7 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
         return True
     from d2rpick.deck.mesh import (
         find_parts_with_elements,
-    )  # imported here: it loads numpy
+    )  # imported here to start faster
 
     parts = find_parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)
@@ -383,7 +383,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield the flaws of the run that have this code."""
+    """Yield the flaws in the run that have this code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
@@ -445,7 +445,7 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return the bodies that no leg switches, and their deforming parts; None for parts without history."""
+    """Return the bodies that no leg switches, each with its deforming parts; None if the parts have no history."""
     from d2rpick.deck.radioss_run import (
         find_left_rigid,
     )  # imported here to start faster

@@ -133,7 +133,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
         if not problem and header.relsw.value and partner is not None:
             first = (
                 header.swset.value < partner.swset.value
-            )  # a problem of both is reported once, at one of them
+            )  # a problem that concerns both sets is reported once, at one of them
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
             elif first:
@@ -184,7 +184,7 @@ def _find_units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
 
 
 def _describe_lone_problem(header: SwitchHeader) -> str:
-    """Return the problem with RELSW and PAIRED of one header; empty if there is none."""
+    """Return what is wrong with RELSW and PAIRED in one header; empty if nothing is wrong."""
     relsw = header.relsw.value
     paired = header.paired.value
     if relsw and not paired:
@@ -195,7 +195,7 @@ def _describe_lone_problem(header: SwitchHeader) -> str:
 
 
 def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
-    """Return the problem with the signs of PAIRED, or the CODEs, of two sets that name each other; else empty."""
+    """Return what is wrong with PAIRED or CODE in two sets that name each other; empty if nothing is wrong."""
     ids = f"sets {first.swset.value} and {second.swset.value}"
     if first.paired.value == second.paired.value:
         return f"{ids} both have PAIRED {first.paired.value}"
@@ -331,7 +331,7 @@ def _check_entity_triggers(case: Case) -> Iterator[Objection]:
 
 
 def _list_entities(entities: Entities) -> str:
-    """Return the contacts or walls as text, each with its id, keyword and title."""
+    """Return a text that lists the contacts or walls, each with its id, keyword and title."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found
@@ -455,7 +455,7 @@ def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
     landed = _make_delayed_deck(wait).deck.replace(
         "       0.2", "       0.7", 1
-    )  # with this ENDTIM
+    )  # the deck with this ENDTIM
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import CardField
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # most ids of the deck that a message lists next to an unknown id
+_NEAREST = 3  # largest number of part ids that a message suggests for an unknown id
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -36,7 +36,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-_DELETED = 1  # value of NRBF and NCSF that deletes constraints
+_DELETED = 1  # value of NRBF and NCSF with which a card deletes constraints
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
@@ -94,7 +94,7 @@ def _make_solid_deck(elform: str, tr: str = "0.02") -> Example:
 def _group_by_card(
     events: Iterable[SwitchEvent],
 ) -> Iterator[tuple[SwitchSet, CardField, str]]:
-    """Yield each card with the field of its first event and the names of all units that it switches."""
+    """Yield each card, the field of its first event, and the names of all parts and part sets that it switches."""
     for card, card_events in group_values(
         (event.by, event) for event in events
     ).items():
@@ -257,7 +257,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield kind (part set, part or lead part) and id of what a line names but the deck does not define."""
+    """Yield the kind and id of each part set, part or lead part that a line names but the deck does not define."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -316,7 +316,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
         return
     from d2rpick.deck.ls_dyna_inventory import (
         find_shared_nodes,
-    )  # imported here: it loads numpy
+    )  # imported here to start faster
 
     for (low, high), node in find_shared_nodes(cards, bodies).items():
         if _is_rigid_together(case, first[low].unit, first[high].unit):
@@ -331,7 +331,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part, by the event that makes it rigid: the end of its LRB chain.
+    """Return, by event that makes a part rigid, the lead part of its rigid body. It is the end of the LRB chain.
 
     A part that is not merged leads itself.
     """
@@ -347,7 +347,7 @@ def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
 
 
 def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
-    """Return True if two units may be rigid at the same time, or if this is unknown because of a switch by force."""
+    """Return True if two parts or sets may be rigid at the same time. If a force switches them, this is assumed."""
     if {first, second} & case.windows.other_rigid:
         return True
     far = float("inf")
@@ -397,13 +397,13 @@ def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
         return {}
     from d2rpick.deck.ls_dyna_inventory import (
         find_first_parts,
-    )  # imported here: it loads numpy
+    )  # imported here to start faster
 
     return find_first_parts(cards, parts)
 
 
 class _Flags(NamedTuple):
-    """NRBF and NCSF with which a card makes parts rigid, and the field of the first of them."""
+    """The flags NRBF and NCSF of a card that makes parts rigid, and the field of the first flag."""
 
     nrbf: int
     ncsf: int
@@ -411,7 +411,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
+    """Return the flags of a card; in a restart they are on *RIGID_DEFORMABLE_CONTROL.  A plain card has no flags."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -480,7 +480,7 @@ def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
 
 
 def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
-    """Yield the parts that a card makes rigid at any time although they must not be switched."""
+    """Yield the parts that must not be switched although a card makes them rigid at some time."""
     if case.sets:
         reasons = {
             part: unswitchable.reason
@@ -603,7 +603,7 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
         return
     from d2rpick.deck.ls_dyna_inventory import (
         find_parts_of_nodes,
-    )  # imported here: it loads numpy
+    )  # imported here to start faster
 
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
     joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))

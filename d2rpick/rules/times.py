@@ -36,21 +36,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-# Output intervals per rigid window: d2rpick then finds crossings within 0.5 % of the window.
+# Number of output intervals in a rigid window from which crossings are found within 0.5 % of the window.
 _INTERVALS = 200
-# Relative excess of an output interval over its limit that rounding explains.
+# Rounding tolerance: relative amount by which an output interval may exceed its limit.
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # With at most this number of cards D2R102 and D2R105 report the same mistake.
+_FEW = 2  # Up to this number of cards, D2R102 and D2R105 would report the same mistake.
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
-_DECADES = 3.0  # decimal powers between two units of time
-# Decades by which the end of the history may differ: a reference run may end at half of the time.
+_DECADES = 3.0  # powers of ten between two adjacent units of time
+# Tolerance for the end time of the history, as a power of ten: a reference run may end at half of the time.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
     "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -109,7 +109,7 @@ def _check_times_in_run(case: Case) -> Iterator[Objection]:
 def _group_closed_windows(
     case: Case,
 ) -> dict[tuple[SwitchSet, SwitchSet], list[SwitchWindow]]:
-    """Return the windows with both ends, by the cards that open and close them."""
+    """Return the windows that have both ends, grouped by the cards that open and close them."""
     return group_values(
         ((window.opened.by, window.closed.by), window)
         for window in case.windows.windows
@@ -118,7 +118,7 @@ def _group_closed_windows(
 
 
 def _name_parts(windows: Sequence[SwitchWindow]) -> str:
-    """Return the ids of the parts in some windows as text."""
+    """Return a text that lists the ids of the parts in some windows."""
     return name_units(window.unit.id for window in windows)
 
 
@@ -141,7 +141,7 @@ def _check_times_in_order(case: Case) -> Iterator[Objection]:
         together = (
             opening.kind == closing.kind == "restart"
             and opening.card.file == closing.card.file
-        )  # rule D2R117 reports cards with such times
+        )  # rule D2R117 reports cards with equal times
         if (
             first.td is not None
             and first.td <= first.tr
@@ -337,7 +337,7 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Yield the objections of the energy history for one rule; parts of one card with the same objection share one."""
+    """Yield the objections of one rule that follow from the energy history; parts of one card share an objection."""
     assert case.judge is not None
     windows = case.windows.windows
     parts_by_times = group_values(

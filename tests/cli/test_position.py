@@ -216,7 +216,7 @@ def test_a_body_that_is_not_known_is_named(deck: str) -> None:
     ]
     assert (
         message
-        == "3 rigid bodies: the position error at td is unknown for that of parts 6, 8"
+        == "3 rigid bodies: the position error at td is unknown for the body of parts 6, 8"
     )
 
 
@@ -267,8 +267,8 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
         warning["code"]: warning["message"] for warning in suggestion["warnings"]
     }
     assert messages["deck-of-another-model"] == (
-        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: the deck is not used; give the deck of "
-        "this run"
+        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: the deck is not used; give the "
+        "deck of this run"
     )
 
 

@@ -103,7 +103,7 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
     for td in (20.0, 27.5):
         answer = suggest_in_history(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
-        assert ("basis", "swings of the energy, counted") in list_situation_heading(
+        assert ("basis", "counted cycles of the energy") in list_situation_heading(
             answer.situation
         )  # no word of parts
         at_tr, at_td = np.interp([require(answer.chosen).tr, td], TIME, x)

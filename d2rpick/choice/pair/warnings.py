@@ -279,7 +279,7 @@ def _describe_not_predicted(
     first = unknown[0]
     others_text = f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
     why = "" if first.whole else ", because its pieces are not connected"
-    which = f"that of {name_units(first.parts)}{others_text}"
+    which = f"the body of {name_units(first.parts)}{others_text}"
     return f"{len(bodies)} rigid bodies: the position error at td is unknown for {which}{why}"
 
 

@@ -18,7 +18,7 @@ FAMILIES: Final = ("d3thdt", "d3plot")
 
 
 class Listed(NamedTuple):
-    """Description of a format that is known before its reader, the ``module``, is imported.
+    """Description of a format, available before its reader (the ``module``) is imported.
 
     The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
     names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
@@ -32,7 +32,7 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# In the order in which formats are tried, and preferred as the source of a quantity.
+# The order is that in which formats are tried, and preferred as the source of a quantity.
 # Binary files come before text files, because they have more digits.
 # csv accepts any text, so it comes after them; rare files come last.
 READERS: Final[Mapping[str, Listed]] = {

@@ -36,10 +36,10 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg: a solver continues a binout there and distributes its branches."""
+    """Open the files of each folder as one leg, because a solver continues and distributes a binout in one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
-        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  start-up
+        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  starts faster
         folders.setdefault(folder, []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
 
@@ -96,7 +96,7 @@ class Binout(Database):
         return read_binout_forces(self._files)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of each file can begin: before the last but one state of both branches."""
+        """Return where a later read of each file can begin: before the second-to-last state of both branches."""
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Values gathered at a time, so that the index arrays stay small compared with the result.
+# Number of values gathered at a time; it keeps the index arrays small compared with the result.
 _CHUNK: Final = 1 << 17
 
 
 @dataclass(frozen=True)
 class Group:
-    """States of one file with one layout: their rows in the columns, and the bytes at which they start."""
+    """States in one file that share a layout: their row numbers in the columns, and their byte offsets."""
 
     file: Lsda
     layout: DirectoryLayout
@@ -55,7 +55,8 @@ class Group:
         values = self.file.read(positions, variable.dtype)
         if variable.dtype.kind != "f":
             return values
-        with np.errstate(invalid="ignore"):  # a NaN is refused later, or not used
+        # a NaN is refused later, unless the value is not used
+        with np.errstate(invalid="ignore"):
             return values.astype(np.float64)
 
 
@@ -101,7 +102,7 @@ def _group_states(
 
 
 class Branch(Database):
-    """The states of one branch in all files of a family; False if no file has the branch.
+    """The states of one branch in all files of a family; it is falsy if no file has the branch.
 
     A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
     state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
@@ -129,7 +130,7 @@ class Branch(Database):
             (file for file in files if file.visits[name]),
             key=lambda file: _read_start(file, name),
         )
-        # Files whose last state is left out.
+        # Names of the files whose last state is left out.
         self._unfinished = [
             file.source for file in visited if _is_unfinished(file, name)
         ]
@@ -223,7 +224,7 @@ class Branch(Database):
 
     @property
     def time_width(self) -> int:
-        """Bytes per time, the fewest of all states; integer times are refused when read."""
+        """Smallest number of bytes of a time in any state; integer times are refused when they are read."""
         widths = [
             variables["time"].dtype.itemsize
             for variables in self._variables
@@ -248,8 +249,9 @@ class Branch(Database):
 
     @cached_property
     def part_ids(self) -> tuple[int, ...]:
-        """Ids of all parts of any state, in the order of the lists."""
-        part_ids: dict[int, None] = {}  # a set that keeps its order
+        """Ids of all parts that occur in any state, in the order of the lists."""
+        # a dictionary serves as a set that keeps its order
+        part_ids: dict[int, None] = {}
         for group in self._groups:
             for part in group.chunks(max(self._list_lengths(group), default=1)):
                 listed = self.ids_of(part)
@@ -258,7 +260,7 @@ class Branch(Database):
         return tuple(part_ids)
 
     def text(self, name: str) -> str:
-        """Return a text of the metadata, empty if it has none of this name."""
+        """Return the metadata text of this name; empty if there is none."""
         for file, start, layout in self._metadata:
             if name in layout.variables:
                 return clean_text(file.raw(start, layout.variables[name]))
@@ -326,7 +328,7 @@ class Branch(Database):
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Return the plausible numbers of values: one per state, one per part, or as many as in the first state."""
+        """Return the plausible numbers of values in a state: one, one per part, or as many as in the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}
@@ -355,7 +357,7 @@ class Branch(Database):
 
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
-        """The lists of part ids in the metadata, each with the number of its file and its byte."""
+        """The lists of part ids in the metadata, each with the number of its file and its byte offset."""
         lists = (
             (file, at, _read_integers(file, at, layout, "ids"))
             for file, at, layout in self._metadata
@@ -380,7 +382,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state applies; a file of an MPI rank may have its list after the first states.
+        # The last list before a state applies. The file of an MPI rank may contain its list after the first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {

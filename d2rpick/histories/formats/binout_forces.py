@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Branches with forces, and what exerts the forces.
+# Branches with forces; for each, the name of what exerts them.
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
@@ -44,13 +44,13 @@ class ForceBranch(Branch):
 
     @property
     def writes_forces(self) -> bool:
-        """True if its states contain forces; a run without contacts writes states with a time only."""
+        """True if the states contain forces. A run without contacts writes states that contain only a time."""
         return bool(self._variables) and all(
             "x_force" in variables for variables in self._variables
         )
 
     def of_each(self, name: str) -> tuple[Indices, Samples]:
-        """Return the listed ids (a contact has one for each side), and one of their variables, shape (n, ids)."""
+        """Return the listed ids (a contact has an id for each side), and the values of one variable, shape (n, ids)."""
         listed: Indices | None = None
         columns: list[tuple[Indices, Samples]] = []
         for group, variable in self.checked(name):

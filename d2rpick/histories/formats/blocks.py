@@ -20,18 +20,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-UNSURE: Final = -1  # offset of a field that is truncated, or occurs twice in the block
+# stands for the offset of a field that is truncated, or occurs twice in the block
+UNSURE: Final = -1
 
-_OVERLONG: Final = 512  # length of a line that no solver writes [bytes]
+_OVERLONG: Final = 512  # length of a line that exceeds all lines of solvers [bytes]
 
-CHUNK: Final = 1 << 20  # bytes compared at once, which fit into the cache
-_FOLD: Final = 16  # adjacent blocks compared as one row, which halves the time
-_LONGEST: Final = 1 << 22  # bytes; a longer block is read record by record
+CHUNK: Final = 1 << 20  # number of bytes compared at once, which fit into the cache
+# number of adjacent blocks compared as one row, which halves the time
+_FOLD: Final = 16
+# largest block that is compared [bytes]; a longer block is read record by record
+_LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
 _EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-# Flags added to the two digits of an exponent, which fill a byte: negative exponent, negative number.
+# Flags for a negative exponent and a negative number; with the two digits of the exponent they fill a byte.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
 
@@ -84,7 +87,7 @@ class Grammar(NamedTuple):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
         longest_line = max(map(len, block.split(b"\n")))
-        if longest_line >= _OVERLONG:  # a damaged line hides further states
+        if longest_line >= _OVERLONG:  # a damaged line may hide further states
             fields = {
                 name: offset if name == self.time else UNSURE
                 for name, offset in fields.items()
@@ -261,7 +264,7 @@ def count_repetitions(
 def _decode_state_numbers(
     blocks: Bytes, fields: Sequence[tuple[int, int]]
 ) -> NDArray[np.int64]:
-    """Return the decimal numbers of each block, shape (blocks, fields); -1 for a number with other characters."""
+    """Return the decimal integers in each block, shape (blocks, fields); -1 for a field with other characters."""
     numbers = np.empty((len(blocks), len(fields)), dtype=np.int64)
     for column, (offset, width) in enumerate(fields):
         digits = blocks[:, offset : offset + width].astype(np.int64) - ord("0")
@@ -274,7 +277,10 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return factors and divisors of integer mantissas, by exponent and signs: one is 1, or NaN if inexact."""
+    """Return the factors and divisors of integer mantissas, by exponent and signs. One of the two is 1.
+
+    Both are NaN if the conversion would be inexact.
+    """
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
         np.minimum(abs(exponent), _EXACT + 1)
@@ -286,7 +292,7 @@ def _make_scales(decimals: int) -> tuple[Samples, Samples]:
 
 
 def parse_fortran_number(text: bytes) -> float:
-    """Return the value of a right-justified Fortran field, NaN if it is not a finite number.
+    """Return the value of a right-aligned Fortran field; NaN if it is not a finite number.
 
     Examples
     --------

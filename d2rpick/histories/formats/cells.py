@@ -30,7 +30,7 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-# Replacement for a number that is too wide for its field.
+# Pattern of the characters that replace a number too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
 # Patterns of a number, by the decimal sign.
@@ -47,7 +47,7 @@ _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-_RULE: Final = "-=+|:_ \t"  # characters of a rule between rows or around a table
+_RULE: Final = "-=+|:_ \t"  # characters of a line drawn between rows or around a table
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
@@ -79,7 +79,7 @@ def split_cells(line: str, separator: str | None) -> list[str]:
 
 
 def is_skipped(line: str) -> bool:
-    """Return True if a line is blank, a comment or a rule made of signs.
+    """Return True if a line is blank, a comment, or a drawn line.
 
     Examples
     --------
@@ -109,12 +109,12 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
 
 
 def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
-    """Return True if a cell holds a number, which is not computed: cells are asked by the thousand."""
+    """Return True if a cell contains a number. The value is not computed, because this is called for many cells."""
     return _written_number(cell, decimal, thousands) is not None
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
-    """Return a number as it is written, without thousands and with the minus sign of ASCII, or None."""
+    """Return the text of a number without thousands separators and with an ASCII minus sign, or None."""
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-")
     if thousands and thousands in cell:
@@ -140,7 +140,7 @@ def is_word(cell: str) -> bool:
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
-    """Return the thousands separator of cells, or an empty string if no cell proves that there is one.
+    """Return the thousands separator in the cells, or an empty string if no cell proves that there is one.
 
     A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
 

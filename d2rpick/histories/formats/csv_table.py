@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
-# Names that spreadsheets, pandas and others give to the column of row numbers.
+# Names that spreadsheets, pandas and other programs give to the column of row numbers.
 _ROW_NUMBERS: Final = frozenset(
     {
         "column 1",
@@ -66,7 +66,7 @@ def label_columns(layout: Layout, time: int) -> dict[str, int]:
 
 
 def find_own_times(layout: Layout) -> tuple[int, ...]:
-    """Return the time columns of curves side by side, each with its own times (x, y, x, y); () for other tables."""
+    """Return the time columns of a table of curves side by side (x, y, x, y); () for other tables."""
     times = tuple(
         column for column in range(0, layout.trusted, 2) if is_time(layout.name(column))
     )
@@ -81,7 +81,7 @@ def find_own_times(layout: Layout) -> tuple[int, ...]:
 def find_numeric_columns(
     layout: Layout, sample: Sequence[Sequence[str]]
 ) -> frozenset[int]:
-    """Return the columns with a number in at least one sampled row; all columns if there is no row."""
+    """Return the columns that contain a number in at least one sampled row; all columns if there is no row."""
     columns = range(layout.columns)
     if not sample:
         return frozenset(columns)
@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column, and notes on assumptions; for curves side by side the time of the first energy.
+    """Return the time column, and notes on assumptions. For curves side by side it belongs to the first energy.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column besides the times, or the only one named like an internal energy."""
+    """Return the only numeric column other than times, or the only column named like an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -209,7 +209,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves; the selection gives the time column and the columns of a last line."""
+    """Open text files as tables or curves. The selection names the time and the columns that a last line must have."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -244,7 +244,7 @@ class Table(Database):
         self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        self._together = True  # until a row shows that a column is not numeric
+        self._together = True  # corrected when a row shows that a column is not numeric
         if not is_skipped(text.unended):
             self.complete = _is_whole_row(
                 text.unended, self._sample, layout, self._needed
@@ -322,7 +322,7 @@ class Table(Database):
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if the table has one row for each part at each time."""
-        # imported here: hardly any table needs it
+        # imported here to start faster
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
         for column in self._needed[1:]:
@@ -366,7 +366,7 @@ class Table(Database):
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
-        """Return the columns that must be complete in a last line without end: the requested or default ones."""
+        """Return the requested (or default) columns. An unterminated last line must have them."""
         try:
             names = [self.find(wanted) for wanted in selection.energy] or [
                 self.energy_channel
@@ -394,7 +394,7 @@ class Table(Database):
                 wanted = {*range(self._layout.columns)} - self._read.keys()
             try:
                 self._keep([self._time, *(wanted - {self._time})])
-            except FormatError:  # possibly in a column that is not needed
+            except FormatError:  # the error may be in a column that is not needed
                 self._together = False
                 self._read_one_by_one(
                     [other for other in quantities if other != column]
@@ -404,7 +404,7 @@ class Table(Database):
         return self._read[column]
 
     def _read_one_by_one(self, columns: Sequence[int]) -> None:
-        """Read these columns one by one; leave out, with a note, those that lack a number in some row."""
+        """Read these columns one by one; leave out, with a note, each column that lacks a number in some row."""
         for column in columns:
             try:
                 self._keep([self._time, column])
@@ -434,7 +434,7 @@ class Table(Database):
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if a line without end has all values, and its last value is unused or of constant length."""
+    """Return True if an unterminated line has all values, and its last value is unused or of constant length."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:

@@ -1,4 +1,4 @@
-"""Read texts with one curve after the other, each with its own times, as pre- and postprocessors export them.
+"""Read text files that list curves one after the other, each with its own times, as postprocessors export them.
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
 star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
@@ -42,14 +42,15 @@ _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
 # x label, y label and name of the curve; the title may be blank
 _FEWEST_LABELS: Final = 3
-_MOST_DIGITS: Final = 12  # digits of a number of pairs; a longer number is damaged
+# largest number of digits in a number of pairs; a longer number is damaged
+_MOST_DIGITS: Final = 12
 
 
 class _TextCurve:
     """A curve: its name, its pairs as text cells, and the line numbers of the pairs."""
 
     def __init__(self, name: str) -> None:
-        from array import array  # imported here: plain tables do not need it
+        from array import array  # imported here to start faster
 
         self.name = name
         self.times: list[str] = []
@@ -58,7 +59,7 @@ class _TextCurve:
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
-    """Read a text of curves, with the times of the first curve of the selection; return None for any other text."""
+    """Read a text of curves; return None for any other text. The first selected curve gives the times."""
     curves = _CurveText(text)
     for read in (_read_curveplot, _read_t_his, _read_dynaform, _read_xy_pairs):
         if read(curves):
@@ -67,7 +68,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State while a text is read: the curves, the label of their x axis, and the unfinished curve."""
+    """State of the reader: the curves so far, the label of their x axis, and the unfinished curve."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -218,7 +219,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # parse_cell returns None for other text, which becomes NaN
+        # parse_cell returns None for a text that is not a number; numpy turns None into NaN
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:

@@ -46,7 +46,7 @@ _MODEL: Final = (
     "z_velocity",
 )
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
-# Values of the parts, each for all parts, by the number of values of a part before it; the velocity has 3.
+# For each quantity: the number of values of a part before it. Each is stored for all parts; a velocity has 3 values.
 _OF_PARTS: Final = {
     "internal_energy": 0,
     "kinetic_energy": 1,
@@ -57,7 +57,8 @@ _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _WALL: Final = "rigid_wall_{}_force"
-_TAIL: Final = 1 << 16  # bytes at the end of a file in which its end mark is searched
+# number of bytes at the end of a file that are searched for its end mark
+_TAIL: Final = 1 << 16
 
 
 def recognises(head: bytes) -> bool:
@@ -82,7 +83,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """States of files: ``rows`` (n, values) of their first words; ``ended`` if each file has its end mark; notes."""
+    """The states: ``rows`` (n, values) has their first words; ``ended`` is True if each file has its end mark."""
 
     rows: Rows
     ended: bool = True
@@ -141,7 +142,7 @@ class D3plot(Database):
 
     @property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the rigid walls; a d3plot has no forces of contacts."""
+        """Rigid-wall forces; a d3plot contains no contact forces."""
         walls = self.channels[GLOBALS:]
         return tuple(
             ContactForce.of_forces(
@@ -196,7 +197,8 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         max(0, len(content) - begin) // head.state
         for content, begin in zip(contents, begins, strict=True)
     ]
-    ends = np.cumsum(counts).tolist()  # number of states up to the end of each file
+    # total number of states up to the end of each file
+    ends = np.cumsum(counts).tolist()
     heads = np.empty((ends[-1], values * real.itemsize), np.uint8)
     first_words_after = [
         content.fill_rows(heads[end - count : end], begin, head.state, real.itemsize)
@@ -216,7 +218,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        return _States(rows)  # usually, without checking each file
+        return _States(rows)  # the usual case, which needs no check of each file
     states_of_files = []
     for file, begin, piece, word in zip(
         files, begins, np.split(rows, ends[:-1]), first_words_after, strict=True
@@ -231,7 +233,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
 
 
 def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
-    """Return True if times are finite and ascend in each file; ``ends`` counts the states up to the end of each."""
+    """Return True if times are finite and ascend in each file; ``ends`` counts the states up to each file end."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
     # a restart may write a state again at the start of a file
@@ -254,7 +256,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # the states begin in the next file
+        ended = True  # this file contains no states: they begin in the next file
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
@@ -302,7 +304,7 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
 
 
 def _note_missing_files(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Return a note on the file numbers that a family leaves out."""
+    """Return a note on the file numbers that are missing in a family."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
     ]

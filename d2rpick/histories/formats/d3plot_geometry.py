@@ -25,14 +25,15 @@ _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # words of the section of numbers before the ids
-_PART_NUMBERING: Final = 16  # words of the section of numbers if it has part ids
-_TITLE: Final = 72  # bytes of a title for both word widths
+_NUMBERING: Final = 10  # length [words] of the section of numbers before the ids
+# length [words] of the head of the section of numbers if it has part ids
+_PART_NUMBERING: Final = 16
+_TITLE: Final = 72  # length of a title [bytes], the same for both word widths
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
 _OTHER_TITLES: Final = (90_002, 90_020)
-_KEYWORD: Final = 80  # bytes of a line of keywords
+_KEYWORD: Final = 80  # length of a line of keywords [bytes]
 _MOST_TITLES: Final = 1_000_000
 
 
@@ -101,14 +102,18 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        self.at += version == 4  # this version has a word for the number of chambers
-        # a type and a name for each value
+        # this version of the airbag data has a word for the number of chambers
+        self.at += version == 4
+        # each value has a type and a name
         self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle
 
     def _nodes_and_elements(self) -> None:
-        """Skip nodes and elements; the two additional nodes of solids follow the solids or, in other releases, all."""
+        """Skip nodes and elements.
+
+        The two additional nodes of solids follow the solids or, in some releases, all elements.
+        """
         control = self._control
         solids = abs(self._control["nel8"])
         self.at += count_dimensions(control) * control["numnp"] + 9 * solids
@@ -123,7 +128,7 @@ class Geometry:
         self._numbering()
 
     def _begins_numbering(self, word: int) -> bool:
-        """Return True if the section of node and element numbers begins at a word."""
+        """Return True if the section of node and element numbers begins at a given word."""
         width = self._words.form.width
         if not self._words.has(word * width, _NUMBERING * width):
             return False

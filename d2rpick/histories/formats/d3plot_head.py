@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 # Values of the whole model: kinetic, internal and total energy, and the velocity.
 GLOBALS: Final = 6
 
-_FEMZIP: Final = 76_893_465  # replaces the number of parts in files packed by femzip
+# stands in place of the number of parts in files packed by femzip
+_FEMZIP: Final = 76_893_465
 # Up to this value of ``maxint`` a state lists deleted elements, otherwise deleted nodes.
 _BY_ELEMENT: Final = -10_000
 # From this release on a state has the position of a rigid wall next to its force.
@@ -110,7 +111,7 @@ def read_d3plot_head(content: Content, source: str) -> Head:
 
 
 def _count_parts(control: Mapping[str, int]) -> int:
-    """Return the number of parts, which older files give for each kind of element."""
+    """Return the number of parts. Older files give a number for each kind of element."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 # end mark of the geometry, the titles, and the states of each file
 END: Final = -999999.0
-HEAD: Final = 512  # bytes of the control words if a word has 8 bytes
-CONTROL: Final = 64  # control words of any file; ``extra`` counts further ones
+HEAD: Final = 512  # length of the control words if a word has 8 bytes [bytes]
+# number of control words in any file; ``extra`` is the number of additional control words
+CONTROL: Final = 64
 
 _PLACES: Final = {
     "filetype": 11, "ndim": 15, "numnp": 16, "nglbv": 18, "it": 19, "iu": 20, "iv": 21, "ia": 22, "nel8": 23,
@@ -34,7 +35,8 @@ _PLACES: Final = {
     "penout": 78, "engout": 79,
 }  # fmt: skip
 _SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
-_RELEASE: Final = 13  # word with the name of the release; its number follows
+# word that contains the name of the release; the release number follows
+_RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
 LONG_IDS: Final = 1000  # added to the file type if ids have 8 bytes
 _DIMENSIONS: Final = range(2, 10)
@@ -114,7 +116,7 @@ class Words:
         return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
 
     def version(self) -> str:
-        """Return solver and name of the release, such as LS-DYNA R920; older files have no name."""
+        """Return the solver and the name of the release, such as LS-DYNA R920. Older files contain no name."""
         name = clean_text(self.bytes(_RELEASE * self.form.width, 4))
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
@@ -131,7 +133,7 @@ class Words:
         return bool(np.frombuffer(data, self.form.real)[0] == END)
 
     def has(self, at: int, size: int) -> bool:
-        """Return True if the file has ``size`` bytes from byte ``at`` on."""
+        """Return True if the file has at least ``size`` bytes from byte ``at`` on."""
         return at + size <= len(self._content)
 
     def damaged(self, content: str) -> FormatError:
@@ -140,7 +142,7 @@ class Words:
         return FormatError(f"{self.source}: it has {content}; {cure}")
 
     def bytes(self, at: int, size: int) -> bytes:
-        """Return ``size`` bytes from byte ``at`` on; raise FormatError if the file ends before."""
+        """Return ``size`` bytes from byte ``at`` on; raise FormatError if the file is shorter."""
         if at < 0 or size < 0 or not self.has(at, size):
             problem = f"{self.source}: the file has {len(self._content)} bytes, its head goes on beyond them"
             raise FormatError(f"{problem}; it is cut or damaged, copy it again")
@@ -148,5 +150,5 @@ class Words:
 
 
 def count_dimensions(control: Mapping[str, int]) -> int:
-    """Return the number of coordinates of a node; the control word has flags above 3."""
+    """Return the number of coordinates of a node. Values of the control word above 3 contain flags."""
     return min(control["ndim"], 3)

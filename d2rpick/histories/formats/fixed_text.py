@@ -39,12 +39,13 @@ if TYPE_CHECKING:
 
     Fields = NDArray[np.bytes_]
 
-_RECENT: Final = 12  # layouts that are tried before a block is parsed
-_LINE: Final = 1 << 10  # bytes; the first line of a block is shorter
+_RECENT: Final = 12  # number of recent layouts that are tried before a block is parsed
+# upper limit for the length of the first line of a block [bytes]
+_LINE: Final = 1 << 10
 
 
 class Blocks(Database):
-    """The complete states of a text file of blocks, from which each format derives its `Database`.
+    """Base class for the `Database` of a text file of blocks; it provides the complete states.
 
     Parameters
     ----------
@@ -67,9 +68,9 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # With at least this many equal blocks, their differing bytes are stored, which needs little memory then.
+    # Number of equal blocks from which their differing bytes are stored, which then needs little memory.
     many = 64
-    batch = 1 << 14  # numbers converted at once, which fit into the cache
+    batch = 1 << 14  # number of numbers converted at once, which fit into the cache
 
     def __init__(
         self,
@@ -83,19 +84,21 @@ class Blocks(Database):
         self._data = make_content(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        # Packed, so that a file whose blocks all differ does not fill the memory.
+        # Stored in packed form, so that a file whose blocks all differ does not fill the memory.
         self._runs = array("q")
         data = self._data
-        end = self._end  # not self: a cycle would keep the file open
+        # does not refer to self, because a reference cycle would keep the file open
+        end = self._end
         self.layout = lru_cache(maxsize=16)(
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        self._trusted = False  # True after a request compared a part of each block
-        # Bits that vary between the blocks of a long run of equal blocks, by its start.
+        # becomes True when a request has compared a part of each block
+        self._trusted = False
+        # Bits that vary between the blocks of a long sequence of equal blocks, by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
         self._asked_ahead = tuple(ahead)
-        # Numbers copied from the blocks of such a run, as printed, by its start.
+        # Numbers copied as printed from the blocks of such a sequence, by the start of the sequence.
         self._ahead: dict[int, Fields] = {}
         self._walk()
         if not self._compared and not self._is_even():
@@ -108,7 +111,7 @@ class Blocks(Database):
         )
 
     def refuse_foreign(self) -> None:
-        """Raise FormatError if the file has neither a head nor a whole state."""
+        """Raise FormatError if the file has neither a header nor a complete state."""
         if not self.version and not self.states:
             problem = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
             raise FormatError(f"{problem} {self.format}; choose another input format")
@@ -135,7 +138,7 @@ class Blocks(Database):
         if tuple(names) == self._asked_ahead:
             # the copied numbers are used once, since the caller keeps the result
             taken, self._ahead = self._ahead, taken
-        # memory that is never written costs nothing
+        # the system provides memory only when it is written
         values = np.zeros((self.states, len(names)))
         is_scattered = np.ones(self.states, bool)
         row = 0
@@ -180,7 +183,7 @@ class Blocks(Database):
         )
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read can begin: at the newest state of the last but two printed times.
+        """Return where a later read can begin: at the newest state with the third-to-last printed time.
 
         The states after it tell whether the last one is whole, and which of those with the same printed time is the
         newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not whole.
@@ -202,7 +205,7 @@ class Blocks(Database):
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
-        """Return a piece of the complete lines of the file."""
+        """Return ``size`` bytes at an offset, up to the end of the last complete line."""
         return self._data[start : min(start + size, self._end)]
 
     def _read(
@@ -214,7 +217,7 @@ class Blocks(Database):
         still = self._decoded(run.start + offsets[~moves])
         if still.view(np.int64).any():
             values[:, ~moves] = still
-        # a slice, unlike an index array, needs no copies
+        # a slice makes no copy, unlike an index array
         moving = slice(None) if moves.all() else np.flatnonzero(moves)
         step = max(1, self.batch // max(1, offsets[moving].size))
         for begin in range(0, run.repeats if moves.any() else 0, step):
@@ -259,7 +262,7 @@ class Blocks(Database):
         raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
-        """Return the offsets of the named numbers in a sequence of blocks; FormatError if one is ambiguous."""
+        """Return the offsets of the named numbers in a sequence of blocks; raise FormatError if one is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
@@ -270,7 +273,7 @@ class Blocks(Database):
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
 
-    # How blocks are found.
+    # Methods that find the blocks.
 
     def _walk(self) -> None:
         """Find all sequences of blocks; leave out incomplete blocks."""
@@ -301,7 +304,7 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        """Return True if a block has the last number of the block before, or is complete by itself."""
+        """Return True if a block has the last number of the previous block, or is recognised as complete."""
         if previous is None:
             return self._grammar.whole(layout)
         return previous.last in layout.fields
@@ -318,7 +321,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of blocks with one of the recent layouts; None for another layout."""
+        """Return the example, stride and number of blocks that have a recent layout; None for another layout."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -377,7 +380,7 @@ class Blocks(Database):
         return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
-        """Count the blocks like the example; store the varying bits and copy the numbers needed first."""
+        """Count the blocks that resemble the example; store their varying bits, and copy the numbers needed first."""
         varied = np.zeros_like(literal)
         fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
@@ -417,14 +420,14 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return the result of `_alike` for one sequence of blocks."""
+        """Return True if the blocks of one sequence equal their example from the first anchor to the last number."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
         end = (
             int(offsets.max()) + self._grammar.width + 1
-        )  # the character after the number must be there, too
+        )  # the character after the number is compared too
         text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride
@@ -432,7 +435,7 @@ class Blocks(Database):
         )
 
     def _is_even(self) -> bool:
-        """Return True if all blocks but the last have one size, and look alike at both ends of the file."""
+        """Return True if all blocks except the last have the same size, and resemble each other at both file ends."""
         runs = list(self)
         if not runs:
             return True

@@ -31,19 +31,19 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Part of the internal energy; read in advance, because it is used whenever it exists.
+# Part of the internal energy that is read in advance, because it is used whenever it exists.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # bytes that contain the header and the first state
+_NEAR: Final = 4096  # number of bytes that contain the header and the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 # The last line of a state in every known glstat; mass scaling may add lines after it.
 _LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-# A value; each rigid wall has its own line with the number of the wall after the value.
+# Pattern of a value. Each rigid wall has a separate line, with the number of the wall after the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
-# Variable text in other lines: numbers, and the element that controls the time step.
+# Pattern of variable text in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
 )
@@ -83,7 +83,7 @@ class Glstat(Blocks):
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        # a missing line is reported when it is read
+        # a missing line is reported when its values are requested
         with suppress(FormatError):
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
@@ -95,7 +95,8 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        self._even = True  # becomes False if a state lacks a line of the others
+        # becomes False if a state lacks a line that other states have
+        self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
@@ -103,7 +104,8 @@ class Glstat(Blocks):
         """Return the values of the line ``name``, shape (n,); FormatError unless every state has it once."""
         if name not in self._columns:
             wanted = [name]
-            if self._even:  # a request for a further line is mostly followed by others
+            # a request for another line is usually followed by more requests
+            if self._even:
                 names = dict.fromkeys((*self.channels, name))
                 wanted = [label for label in names if label not in self._columns]
             self._columns |= self._pass_over(wanted, [name])
@@ -136,11 +138,11 @@ class Glstat(Blocks):
 def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
-    """Return the offsets of the values of a block by label, and the last label; UNSURE for a value that is cut."""
+    """Return the offsets of a block's values by label, and the last label; UNSURE for a truncated value."""
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
-        # a truncated line in between may belong to another state
+        # a truncated line within the block may belong to another state
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()

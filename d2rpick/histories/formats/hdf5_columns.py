@@ -28,11 +28,12 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-_BOOKKEEPING: Final = ("_i_", "#")  # index trees of PyTables, references of MATLAB
+# names of groups without histories: index trees of PyTables, references of MATLAB
+_BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-_WIDEST: Final = 64  # columns; a wider matrix without names is not a table of histories
+_WIDEST: Final = 64  # largest number of columns of a table of histories without names
 
-# Share of a file; smaller datasets are copied, since a view would keep the whole file in memory.
+# Datasets below this share of the file are copied, because a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
@@ -56,7 +57,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if it has the name of a time; ``time/value`` is judged by ``time``."""
+        """True if the column has the name of a time; for ``time/value`` the name is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -68,7 +69,7 @@ class Column(NamedTuple):
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Return its values, shape (size,), from a file with this ``content``; FormatError unless all are finite."""
+        """Return its values, shape (size,), from the ``content`` of a file; FormatError if one is not finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -115,7 +116,7 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError for number types that HDF5 does not define: a changed byte would change all numbers."""
+    """Raise FormatError for number types that HDF5 does not define, because a damaged type changes all numbers."""
     for kind in _list_number_types(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _list_standard_types()):
             raise FormatError(
@@ -157,7 +158,7 @@ def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; a contiguous one that fills most of the file is a view of ``content``."""
     start = (
         dataset.id.get_offset()
-    )  # there is no offset for data in chunks or in other files
+    )  # data in chunks or in other files have no offset in this file
     if start is None:
         return dataset[()]
     if not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
@@ -185,7 +186,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     columns: list[Column] = []
     read_groups: list[
         str
-    ] = []  # groups that are read completely by a reader of their layout
+    ] = []  # groups whose layout has a reader of its own, which reads them completely
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if any(step.startswith(_BOOKKEEPING) for step in name.split("/")):
@@ -382,7 +383,8 @@ def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
     """Yield the index of a frame or series, if it consists of numbers."""
     title = _read_attribute_text(index.attrs.get("name"))
-    title = "index" if title in ("", "N.") else title  # "N." is a pickled None
+    # "N." is the pickled form of None
+    title = "index" if title in ("", "N.") else title
     if index.dtype.kind in "iuf" and index.ndim == 1:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
 

@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # columns listed in a message
+_MANY: Final = 12  # largest number of columns that a message lists
 _BRANCHES: Final = ("glstat", "matsum")
-# Errors of h5py for a damaged file.
+# Exceptions that h5py raises for a damaged file.
 _DAMAGED: Final = (
     OSError,
     RuntimeError,
@@ -54,13 +54,13 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
-# Offset of the end-of-file address in superblocks of version 0 to 3 with 8-byte addresses, as all writers use.
+# Offset of the end-of-file address in superblocks of version 0 to 3. All writers use 8-byte addresses.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 # Time-out of a read: 60 s plus 1 s per 100 kB. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
 _SLOWEST: Final = 100_000  # slowest expected reading speed [bytes/s]
-_USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
+_USER_BLOCK: Final = 512  # number of bytes that MATLAB puts before the file
 
 
 def recognises(data: bytes) -> bool:
@@ -76,7 +76,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as columns."""
     _import_library(source.name)
-    # In memory regardless of its size: the library crashes on some mixtures of two versions of a file.
+    # The file is read into memory: if it changes on disk, the library may crash on a mixture of two versions.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
@@ -120,11 +120,11 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column named like an internal energy, or next to the time; otherwise FormatError lists them."""
+        """The only column named like an internal energy, or next to the time; otherwise FormatError lists all."""
         return _find_only_energy(self._columns, self._named_time, self.source).path
 
     def find(self, wanted: str) -> str:
-        """Return the path of the column that ``wanted`` means."""
+        """Return the path of the column that ``wanted`` selects."""
         return _find_named_column(wanted, self._columns, self.source).path
 
     @cached_property
@@ -160,7 +160,7 @@ class Columns(Database):
         return self._load(column)
 
     def _check_own_times(self, column: Column) -> None:
-        """Raise FormatError if the group of a column has other times than the energy."""
+        """Raise FormatError if the times in the group of a column differ from the times of the energy."""
         times_of_group = [
             time
             for time in self._columns
@@ -190,7 +190,7 @@ class Columns(Database):
 
     @cached_property
     def _time_column(self) -> Column:
-        """The column of the selection, or the time nearest to the energy."""
+        """The selected time column, or the time in the group nearest to the energy."""
         if self._named_time:
             return self._named_time
         if self._energies:
@@ -351,7 +351,7 @@ def _find_only_energy(
 
 
 def _find_only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
-    """Return the time in the group of the energy, or in the nearest group that contains it."""
+    """Return the time in the group of the energy, or in the nearest enclosing group."""
     group = energy.group
     while True:
         fitting = [
@@ -403,7 +403,7 @@ def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         ) from error
 
 
-# Checks for damage that makes the library crash or loop endlessly.
+# Checks for damage that would make the library crash or loop endlessly.
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
@@ -447,7 +447,7 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
         or len(head) < offset + _ADDRESS_SIZE
         or head[_SIZE[version]] != _ADDRESS_SIZE
     ):
-        return  # the library reports the problem
+        return  # the library reports the problem itself
     (end,) = struct.unpack_from("<Q", head, offset)
     if size not in (end, end + base):
         raise FormatError(

@@ -14,9 +14,9 @@ from d2rpick.histories.names import is_unit, normalise_name
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-_SHORT: Final = 60  # characters of a line that a message quotes
+_SHORT: Final = 60  # largest number of characters of a line that a message quotes
 # The first columns of OpenRadioss' th_to_csv in every version.
-# After them, some versions write more or fewer names than columns (OpenRadioss/Tools, issue 98).
+# Some versions then write more or fewer names than columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -36,7 +36,7 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-# Columns that are used if another program wrote more names than columns: the time and the first value.
+# Number of columns used if another program wrote more names than columns: the time and the first value.
 _SURE_WITHOUT: Final = 2
 
 
@@ -92,7 +92,7 @@ def read_header(
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        # 3DEXPERIENCE: the third name is that of the curve
+        # 3DEXPERIENCE: the third name is the name of the curve
         title = " ".join(filter(None, names[2:]))
         sure = None
     return Header(tuple(names), units, title, sure)
@@ -105,7 +105,7 @@ def quote_start(line: str) -> str:
 
 
 def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
-    """Return the number of columns with certain names, None for all; raise FormatError if there is none."""
+    """Return the number of columns whose names are certain (None: all); raise FormatError if none is certain."""
     if len(names) == columns:
         return None
     if tuple(map(normalise_name, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
@@ -142,19 +142,19 @@ def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str
 
 
 def _join_names(upper: str, lower: str) -> str:
-    """Join the names of a column from two rows; the name of a time stays alone."""
+    """Join the names of a column from two rows; the name of a time is not joined."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return one cell per column, without empty cells after them; [] if there are too few or further names."""
+    """Return one cell per column, without empty cells after them; [] if there are too few or too many names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat a name over the empty cells after it, which a spreadsheet merged with it, except the name of the time."""
+    """Repeat a name, except the time's, in the empty cells after it, which a spreadsheet had merged with it."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -191,7 +191,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Return the names in the last comment line, as numpy.savetxt writes them: one for each column, with a time."""
+    """Return the names in the last comment line if they name each column and a time, as in numpy.savetxt files."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 
 # Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
-# A comma as both can be read only if the numbers are in quotes.
-# stands in the head of d3hsp and messag
+# If both are a comma, rows can be read only if the numbers are in quotes.
+# text at the beginning of a d3hsp and a messag
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
@@ -40,7 +40,7 @@ _FORMS = (
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Numbers of lines in which rows are searched: first more than most headers have, finally more than any has.
+# Numbers of lines in which the first row is searched for: more than most headers have, then more than any has.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -65,7 +65,7 @@ class Layout(NamedTuple):
 
     @property
     def trusted(self) -> int:
-        """Number of columns, from the first, that may be used."""
+        """Number of columns that may be used, counted from the first one."""
         return self.columns if self.sure is None else self.sure
 
     def number(self, cell: str) -> float | None:
@@ -78,7 +78,7 @@ class Layout(NamedTuple):
         return plain.replace(self.decimal, ".")
 
     def name(self, column: int) -> str:
-        """Return the name of a column in the file, or its number if it has none."""
+        """Return the name of a column in the file, or its number if it has no name."""
         name = self.names[column] if column < min(len(self.names), self.trusted) else ""
         return name or f"column {column + 1}"
 
@@ -109,7 +109,7 @@ def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
 
 
 def find_layout(text: Text) -> Layout:
-    """Find the layout of a table by its first lines; a last line without end is used only if there is no other row.
+    """Find the layout of a table by its first lines. An unterminated last line is used only if it is the only row.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator that the cells of ``rows`` prove, if some of them are not numbers without it."""
+    """Add the thousands separator that the cells of ``rows`` prove, if some cells are not numbers without it."""
     odd = [
         cell
         for row in rows
@@ -176,7 +176,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
-    """Search the rows in few lines, then in more, each time without and with thousands separators."""
+    """Search for the rows in few lines, then in more lines, each time without and with thousands separators."""
     candidates = (
         (number, line)
         for number, line in enumerate(lines)
@@ -197,7 +197,7 @@ def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | N
 def _find_rows(
     sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool
 ) -> Layout | None:
-    """Return the layout in which most lines are rows, with words or without; else one with rows of numbers only."""
+    """Return the layout in which most lines are rows, which may contain words; else a layout with only numbers."""
     forms: Sequence[tuple[str | None, str]]
     if separator:
         forms = [(separator, decimal) for decimal in ".," if separator != decimal]
@@ -229,7 +229,7 @@ def _find_rows(
             counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            # True if every row ends with a separator
+            # in this case every row ends with a separator
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
             if columns > 1 and count > best_count:
@@ -244,7 +244,7 @@ def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
     """Return, for each cell of a row, True if it is a number or missing; an empty tuple if the line is not a row."""
-    if len(cells) < 2:  # most often: a wrong separator
+    if len(cells) < 2:  # the usual case, caused by a wrong separator
         return ()
     written = [form.number(cell) is not None for cell in cells]
     numbers = tuple(
@@ -261,7 +261,7 @@ def _find_numbers_in_row(
 
 
 def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
-    """Return True if a row has as many cells as the common kind, and numbers at least in its number cells."""
+    """Return True if a row has the usual number of cells, and numbers wherever most rows have numbers."""
     return len(kind) == len(common) and all(
         is_number or not is_commonly_number
         for is_number, is_commonly_number in zip(kind, common, strict=True)
@@ -284,7 +284,7 @@ def _refuse_odd_rows(
 
 
 def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
-    """Raise FormatError for rows like ``0,05,1,25``: integers with leading zeros are decimals of numbers."""
+    """Raise FormatError for rows like ``0,05,1,25``, in which integers with leading zeros are decimal places."""
     if table.separator != ",":
         return
     for number, line in enumerate(

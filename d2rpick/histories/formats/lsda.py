@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # types of records: symbol tables and their entries
-_LONGEST: Final = 1 << 32  # bytes; a symbol table is shorter
+_TABLES: Final = range(4, 8)  # record types of symbol tables and their entries
+_LONGEST: Final = 1 << 32  # upper limit for the length of a symbol table [bytes]
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {
@@ -52,11 +52,11 @@ _TYPES: Final = {
     10: "f8",
 }
 
-# Bytes that contain header, type and name of a variable; more bytes around them are read at once.
+# Number of bytes that contain the header, type and name of a variable; more bytes are read at once.
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# From this number of repetitions on, comparing arrays is faster than reading the records.
+# Number of repetitions from which comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
 # Names of state directories: d and the number of the state, with 6 to 18 digits (which fit an int64).
@@ -80,7 +80,7 @@ class DirectoryLayout(NamedTuple):
 
 
 class _Form(NamedTuple):
-    """The bytes of a directory's records as one integer, for a quick comparison with another directory.
+    """The bytes of a directory's records as one integer, which is quick to compare with another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -154,11 +154,11 @@ class Lsda:
         return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Return number, start and layout of each visit to a state of a branch, shape (n, 3)."""
+        """Return the number, start and layout of each visit to a state of a branch, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
-        """Return where a later read can begin: at the last but one state of the branch whose state is first.
+        """Return where a later read can begin: at the earliest second-to-last state of any branch.
 
         The head repeats the metadata of all wanted branches, each behind a change to its directory.
         """
@@ -200,7 +200,7 @@ class Lsda:
         unpack = self._head.unpack_from
         head = self._head.size
         size, name_length = len(data), head + self._type.size
-        near, base = b"", 0  # bytes around the current position
+        near, base = b"", 0  # the bytes around the current position
         path: tuple[str, ...] = ()
         number = -1
         start = position
@@ -352,14 +352,14 @@ class Lsda:
         times, steps = count_repetitions(self.data, previous, fixed, numbers)
         if times < 2:
             return 0
-        # A number ends its record: the next byte is where the records of the state start.
+        # A state number ends its record, so the records of the state start at the next byte.
         growth = {
             previous + at + width: step
             for (at, width), step in zip(numbers, steps, strict=True)
         }
         ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
-            if not visits:  # a branch that the file lacks
+            if not visits:  # the file lacks this branch
                 continue
             last_visits = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = last_visits[np.isin(last_visits[:, 1], [*growth])]
@@ -371,7 +371,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Return True if a search for repetitions is worthwhile, by a quick comparison of records one stride apart."""
+        """Quickly compare records one stride apart; return True if a search for repetitions is worthwhile."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]
@@ -438,7 +438,7 @@ def recognises(head: bytes) -> bool:
 
 
 def _resolve_path(path: tuple[str, ...], change: str) -> tuple[str, ...]:
-    """Return the directory that a change of directory leads to.
+    """Return the path after a change of directory.
 
     Examples
     --------

@@ -47,10 +47,12 @@ _AXES: Final = (
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
-_MAT: Final = "mat.#"  # begins the lines of a part
-_LUMPED: Final = 0  # "mat.#=    0" has the kinetic energy of lumped masses
-_UNREADABLE: Final = -1  # replaces a part number that is damaged or has overflowed
-_WIDEST: Final = 99_999_999  # larger part numbers overflow their eight columns
+_MAT: Final = "mat.#"  # text that begins the lines of a part
+# the part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy
+_LUMPED: Final = 0
+_UNREADABLE: Final = -1  # stands for a part number that is damaged or has overflowed
+# largest part number; larger numbers overflow their eight columns
+_WIDEST: Final = 99_999_999
 
 _LEGEND: Final = re.compile(
     rb"^\{BEGIN LEGEND\}[ \r]*\n(.*?)^\{END LEGEND\}", re.MULTILINE | re.DOTALL
@@ -58,7 +60,7 @@ _LEGEND: Final = re.compile(
 _ENTRY: Final = re.compile(
     rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE
 )
-_LONGEST: Final = 1 << 24  # bytes; a legend is shorter
+_LONGEST: Final = 1 << 24  # upper limit for the length of a legend [bytes]
 _LINE: Final = re.compile(
     rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$",
     re.MULTILINE,
@@ -70,7 +72,7 @@ _ID: Final = re.compile(
 )
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*"
-)  # numbers in lines that may vary between states
+)  # pattern of the numbers in lines that may vary between states
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
@@ -116,7 +118,7 @@ class Matsum(Blocks):
         super().__init__(data, source, grammar)
         self.refuse_foreign()
         self.part_time = self.numbers([_TIME])[:, 0]
-        # Columns that were read together with requested ones.
+        # Columns that were read together with requested columns.
         self._together: dict[tuple[str | int, ...], Samples] = {}
         present = self._present()
         self.parts = tuple(
@@ -145,7 +147,7 @@ class Matsum(Blocks):
             )
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._together:
-            # a request for one component is followed by requests for the others
+            # a request for one component is usually followed by requests for the other components
             together = _AXES if quantity in _AXES else (quantity,)
             names = [
                 (id_, QUANTITIES[component]) for id_ in ids for component in together
@@ -171,7 +173,7 @@ class Matsum(Blocks):
         return states
 
     def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
-        """Return notes on parts that are not in all states, or whose number cannot be read."""
+        """Return notes on parts that are missing in some states, or whose number cannot be read."""
         unseen = [id_ for id_ in self._legend if id_ not in present]
         passing = [
             id_ for id_, states in present.items() if id_ > 0 and states < self.states
@@ -201,7 +203,7 @@ def _read_legend(data: bytes | Content) -> dict[int, str]:
 
 
 class PartColumns(NamedTuple):
-    """Histories of one part that are written, all of the same shape (n,)."""
+    """Histories of one part to be written, all of the same shape (n,)."""
 
     title: str
     internal_energy: Samples
@@ -246,7 +248,7 @@ def _write_part(
 
 
 def _has_all_parts(legend: Mapping[int, str], layout: BlockLayout) -> bool:
-    """Return True if the only state of a file has all parts of the legend; False without a legend."""
+    """Return True if the only state of a file has all parts of the legend; False if there is no legend."""
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
@@ -265,7 +267,7 @@ def _describe_matsum_block(
         if line[1] is not None:
             part = _find_part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
-            if doubled:  # with two groups of lines for one part, neither is reliable
+            if doubled:  # if a part has two groups of lines, neither is reliable
                 fields.update({field: UNSURE for field in fields if field[0] == part})
             # the offset includes the line end before the line
             fields[part, _MAT] = UNSURE if doubled else line.start() - 1

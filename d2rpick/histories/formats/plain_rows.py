@@ -1,4 +1,4 @@
-"""Read uniform rows of numbers at once; with any pandas version the result is that of `float`."""
+"""Read uniform rows of numbers at once; the result equals that of `float` with any pandas version."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Samples
 
-_UNIT_SEPARATOR: Final = "\x1f"  # a control character that no table has
-# Largest relative error of the fast pandas reader, which uses 17 digits including leading zeros.
+_UNIT_SEPARATOR: Final = "\x1f"  # a control character that occurs in no table
+# Largest relative error of the fast pandas reader. It uses 17 digits, and counts leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
 
@@ -45,7 +45,7 @@ def read_plain_rows(
         # otherwise the parser checks that each row has its cells
         if not _has_all_cells(piece, layout):
             return None
-        # a comment would show in the first column, so that is read too
+        # the first column is read too, because it would show a comment
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
@@ -57,7 +57,7 @@ def read_plain_rows(
     # bytes.count() is slow if the lines are short
     lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
     if table.shape != (lines, len(read_columns)):
-        return None  # the reader skipped blank lines
+        return None  # the parser skipped blank lines
     if read_columns == [*used]:
         return table
     return table[:, np.searchsorted(read_columns, used)]
@@ -80,11 +80,12 @@ def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
 def _read_with_numpy(
     piece: bytes, layout: Layout, columns: Sequence[int] | None
 ) -> Samples:
-    """Read rows of numbers with numpy, all columns unless some are chosen; raise ValueError for anything else."""
-    # no character outside latin-1 belongs to a number
+    """Read rows of numbers with numpy, in the given columns or all columns; raise ValueError for other rows."""
+    # numbers contain no character outside Latin-1
     lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
-        raise ValueError  # numpy skips blank lines, and warns if there are no others
+        # numpy skips blank lines, and warns if there are no other lines
+        raise ValueError
     return np.loadtxt(
         lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns
     )
@@ -116,13 +117,14 @@ def _read_with_pandas(
             exact = read_exact_numbers(piece, layout.separator, fast)
             if exact is not None:
                 return exact
-        options["float_precision"] = "round_trip"  # takes three times as long
+        # the exact reader takes three times as long
+        options["float_precision"] = "round_trip"
     table: Samples = pd.read_csv(BytesIO(piece), sep=separator, **options).to_numpy()
     return table
 
 
 def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
-    """Read rows of numbers exactly with scipy; None if scipy fails or contradicts the numbers ``fast``.
+    """Parse rows of numbers exactly with scipy; None if scipy fails or disagrees with the fast result ``fast``.
 
     Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
     result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
@@ -138,7 +140,7 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # only finite numbers can agree
+    with np.errstate(invalid="ignore"):  # numbers that are not finite never agree
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 

@@ -23,23 +23,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-# bytes of a binary number, and of the length before and after a record
+# size of a binary number, and of the record length before and after each record [bytes]
 WIDTH: Final = 4
-RUN: Final = 84  # bytes of the first record: a code and a title of 80 bytes
+RUN: Final = 84  # size of the first record [bytes]: a code and a title of 80 bytes
 
 _MARK: Final = b"ZZZZZEOR"
 _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n")
 _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
-_LONG, _SHORT = 10, 5  # columns of an integer, in the two formats
-_STARS: Final = b"*" * _SHORT  # printed by Fortran for a number that is too long
-_ROOM: Final = 1024  # bytes; a header record is shorter, apart from its integers
-_RUN_TITLE: Final = 72  # characters of the title of the run in text (80 in binary)
-_REAL: Final = 16  # columns of a real, whose point is in the fourth column
+_LONG, _SHORT = 10, 5  # number of columns of an integer in the two text formats
+# Fortran prints this in place of a number that is too long
+_STARS: Final = b"*" * _SHORT
+# upper limit for the length of a header record without its integers [bytes]
+_ROOM: Final = 1024
+# number of characters of the run title in text files (80 in binary files)
+_RUN_TITLE: Final = 72
+# number of columns of a real number, whose decimal point is in the fourth column
+_REAL: Final = 16
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
-_JUDGED: Final = 100  # last times by which the precision is judged
+# number of times at the end of a file from which the precision is determined
+_JUDGED: Final = 100
 
 
 def is_binary(head: bytes) -> bool:
@@ -52,12 +57,12 @@ def is_binary(head: bytes) -> bool:
 
 
 def is_text(head: bytes) -> bool:
-    """Return True if a file with these first bytes is a time history in any form of text."""
+    """Return True if these first bytes belong to a time history in any text format."""
     return any(_MARK in line for line in head.split(b"\n", 4)[:4])
 
 
 def open_records(data: Content, source: str) -> Records:
-    """Return the records of a file; raise FormatError for text of another form, such as ``/TFILE/2``."""
+    """Return the records of a file; raise FormatError for another text format, such as ``/TFILE/2``."""
     head = data[:_ROOM]
     begin = _BEGIN.match(head)
     if begin:
@@ -73,7 +78,7 @@ def open_records(data: Content, source: str) -> Records:
 class Records:
     """The layout of the records in a binary file; ``at`` is the byte of the next header record."""
 
-    width = WIDTH  # bytes of a number in a state
+    width = WIDTH  # size of a number in a state [bytes]
 
     def __init__(self, data: Content, at: int = 0) -> None:
         self._data, self.at = data, at
@@ -101,13 +106,14 @@ class Records:
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return offsets and bytes of the marks that every record with ``count`` reals has, of equal length."""
+        """Return the offsets and bytes of the marks in every record with ``count`` reals; all have the same length."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
         """Return the reals in their bytes (n, width), shape (n,); NaN for bytes that are not a number."""
-        with np.errstate(invalid="ignore"):  # a NaN is refused later, or not used
+        # a NaN is refused later, unless the value is not used
+        with np.errstate(invalid="ignore"):
             return fields.view(">f4").ravel().astype(np.float64)
 
     def digits(self, times: Samples) -> int:  # noqa: ARG002
@@ -138,7 +144,7 @@ class _TextRecords(Records):
             return None
         body = body.removesuffix(b"" if mark else self._line_end)
         self.at = begin + len(body) + len(self._line_end)
-        if shape[4] == b"R":  # conversion factors of the units, which are not used
+        if shape[4] == b"R":  # the conversion factors of the units are not used
             return bytes(WIDTH * last)
         return self._packed(body.removesuffix(self._name), first, characters, last)
 
@@ -181,12 +187,12 @@ class _TextRecords(Records):
 
     def values(self, fields: Bytes) -> Samples:
         values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
-        # a shifted or blanked number is often another one
+        # a number with shifted or missing characters often still reads as a number
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
 
     def digits(self, times: Samples) -> int:
-        """Return the digits of single precision if all times are singles, which the solver used then."""
+        """Return the digits of single precision if all times are single-precision numbers, as the solver then used."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()
@@ -205,7 +211,7 @@ def split_integers(record: bytes) -> tuple[int, ...]:
 
 
 def _pack_integers(text: bytes, count: int, width: int) -> bytes:
-    """Pack ``count`` integers of ``width`` columns; stars (for a material or property) become 1, not 0."""
+    """Pack ``count`` integers of ``width`` columns. Stars stand for a material or property id and become 1, not 0."""
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
-# bytes of a title other than that of the run, by age of the format
+# possible lengths [bytes] of titles other than the run title, from older to newer formats
 _TITLES: Final = (
     40,
     80,
@@ -54,7 +54,7 @@ _GLOBALS: Final = (
     "added_mass", "percentage_added_mass", "inlet_mass", "outlet_mass", "inlet_energy", "outlet_energy",
 )  # fmt: skip
 
-# Variables of parts that are used, by their code in the file.
+# Part variables that are used, by their code in the file.
 _PART_VARIABLES: Final = {
     1: "internal_energy", 2: "kinetic_energy", 3: "x_momentum", 4: "y_momentum", 5: "z_momentum", 6: "mass",
     7: "hourglass_energy", 9: "x_center", 10: "y_center", 11: "z_center", 21: "rotational_internal_energy",
@@ -62,7 +62,7 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-# Kinds of groups with forces; codes of the normal and tangential impulses among their variables.
+# Kinds of groups that have forces, and the variable codes of the normal and tangential impulses.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
@@ -80,12 +80,12 @@ class _Group(NamedTuple):
 
     @property
     def values(self) -> int:
-        """Number of values in a state."""
+        """Number of values of the group in a state."""
         return self.members * len(self.variables)
 
 
 class _Head(NamedTuple):
-    """The content of the records before the first state."""
+    """The header: the content of the records before the first state."""
 
     title: str
     version: str
@@ -94,7 +94,7 @@ class _Head(NamedTuple):
     # index of a part's variable among the variables of all parts
     columns: dict[tuple[int, str], int]
     counts: tuple[int, ...]  # numbers in the records of one state
-    groups: tuple[_Group, ...]  # groups whose records are the last ones of a state
+    groups: tuple[_Group, ...]  # groups, whose records end each state
 
 
 def recognises(head: bytes) -> bool:
@@ -149,7 +149,7 @@ class TimeHistory(Database):
         self._records = open_records(self._data, source)
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
-        # only parts in a card /TH/PART have variables
+        # only parts named by a /TH/PART card have variables
         parts_with_variables = {id_ for id_, _ in head.columns}
         self.parts = tuple(
             part for part in head.parts if part.id in parts_with_variables
@@ -205,7 +205,7 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of the file can begin: at its last but one whole state."""
+        """Return where a later read of the file can begin: at the second-to-last complete state."""
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
@@ -257,7 +257,7 @@ class TimeHistory(Database):
         return self._records.values(fields).reshape(self._states, len(columns))
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
-        """Return the byte offsets of numbers in each of the first states, shape (states * offsets,)."""
+        """Return the byte offsets of the numbers in each of the first ``states`` states, shape (states * offsets,)."""
         return np.add.outer(
             self._records.at + self._stride * np.arange(states),
             np.array(offsets, np.int64),
@@ -302,13 +302,13 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """The reader of the header, which takes its records one after the other."""
+    """Reads the records of the header one after the other."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        # bytes of a title, the same in all records; 0 until the first one is read
+        # length of the titles [bytes], the same in all records; 0 until the first title is read
         self._title = 0
 
     def head(self) -> _Head:
@@ -316,7 +316,7 @@ class _HeadRecords:
         run = self._next(RUN)
         version = clean_text(self._next(80))
         hierarchy = self._next()
-        # newer releases write a record with the number of additional records
+        # newer releases write a record that contains the number of additional records
         if len(hierarchy) == WIDTH:
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
@@ -414,7 +414,7 @@ class _HeadRecords:
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read a record of ``count`` integers; there is no record for 0."""
+        """Read a record of ``count`` integers; for 0 the file has no record."""
         return split_integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
@@ -424,7 +424,7 @@ class _HeadRecords:
         return number
 
     def _next(self, length: int | None = None) -> bytes:
-        """Read the next record; raise FormatError if it is incomplete, or has another length."""
+        """Read the next record; raise FormatError if it is incomplete, or has an unexpected length."""
         record = self._records.take()
         if record is None:
             raise self._broken("a complete record")

@@ -1,4 +1,4 @@
-"""Read the numbers in the rows of a table: at once if all rows of a piece are uniform, otherwise line by line."""
+"""Read the numbers in the rows of a table. Uniform rows are read in large pieces, other rows line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table in the requested order, and notes on omitted lines below the table."""
+    """Columns (rows,) of a table in the requested order, and notes on lines below the table that were left out."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -101,24 +101,27 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """State of reading a table: the last time, gaps, and lines found below the table."""
+    """State of the reader of a table: the last time, gaps, and lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
         self._name = name
         self._before: float | None = None  # time of the last state
         self._gap = self._ended = False
-        self._read: list[Samples] = []  # states of the earlier pieces
-        self._current: list[list[float]] = []  # states of this piece so far
+        self._read: list[
+            Samples
+        ] = []  # states of the earlier pieces, an array for each
+        # states read from the current piece so far
+        self._current: list[list[float]] = []
         self._below: _Below | None = None
         self._repeated = (
             0  # number of states of the table that are repeated below the table
         )
-        self._repeated_from = 0  # line of the first repeated state
+        self._repeated_from = 0  # line number of the first repeated state
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on lines omitted below the table."""
+        """Notes on lines below the table that were left out."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -129,7 +132,7 @@ class _Curve:
         return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Store states (rows, used) of a piece that was read at once."""
+        """Store the states (rows, used) of a piece that was read at once."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
@@ -147,7 +150,7 @@ class _Curve:
     def states(
         self, rows: Sequence[str], first: int
     ) -> Iterator[tuple[int, list[float]]]:
-        """Yield line number and values of each state in ``rows``, the first of which has the line number ``first``."""
+        """Yield the line number and values of each state in ``rows``; ``first`` is the line number of the first row."""
         for number, row in enumerate(rows, first):
             if is_skipped(row):
                 self._gap = True
@@ -170,7 +173,7 @@ class _Curve:
                 yield number, state
 
     def _read_state(self, number: int, row: str) -> list[float] | None:
-        """Return the values of the used columns of a row; None if all of them are empty after the first state."""
+        """Return the values of the used columns in a row; None if all are empty and a state precedes the row."""
         where = f"{self._name}:{number}"
         cells = _split_row(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
@@ -181,7 +184,7 @@ class _Curve:
         ]
 
     def _is_below(self, row: str) -> bool:
-        """Return True if a line that is not a row may be below the table: it begins with a word and has no time."""
+        """Return True if a line that is not a row begins with a word and has no time, as lines below a table do."""
         cells = split_cells(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
@@ -224,7 +227,7 @@ class _Curve:
         continues = state[0] > float(table[-1, 0])
         if (
             is_header or continues
-        ):  # the table continues, so the line between is damaged
+        ):  # the table continues, so the line in between is damaged
             raise below.error
         problem = (
             f"{self._name}:{number}: another table begins here, after line {below.line} "

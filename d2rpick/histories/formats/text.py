@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8: Final = b"\xef\xbb\xbf"
 
-# Lines in which the form of a text is searched.
+# Number of lines from which the form of a text is determined.
 HEAD: Final = 10_000
 
-# Digits before and after the point, and the exponent.
+# Pattern of a number: digits before and after the decimal point, and the exponent.
 _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
-# Significant digits that restore every double, and the form of a number without an exponent.
+# Number of significant digits that restore every double, and the pattern of a number without an exponent.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# Every double keeps 15 significant digits; a format that prints as many is treated as lossless.
+# A double keeps every number of 15 significant digits. A format that prints this many is treated as lossless.
 _FULL = 15
 
 
@@ -40,32 +40,33 @@ class Text:
     A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # Amounts that are read at once.
-    top = HEAD  # lines in which the form of the text is searched
-    # bytes of a piece, whose cells then fit into the cache of the processor
+    # Numbers of lines and bytes that are read at once.
+    top = HEAD  # number of lines from which the form of the text is determined
+    # size of a piece, whose cells fit into the processor's cache [bytes]
     piece = 1 << 17
     # A text of at most this size is used completely to find the printed precision [bytes].
     short = 1 << 16
-    some = 100  # lines sampled at the start, at the end and between of a longer text
-    # Bytes of a piece of a large text: each call of pandas or scipy costs milliseconds.
+    # number of lines sampled at the start, at the end and in between, if the text is longer
+    some = 100
+    # Size of a piece of a large text [bytes]; each call of pandas or scipy costs milliseconds.
     large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last line that has an end.
+        # Offset after the last terminated line.
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first lines with an end, as many as are searched for the form of the text."""
+        """The first terminated lines, from which the form of the text is determined."""
         return self._first[: self.top]
 
     @property
     def is_short(self) -> bool:
-        """True if ``head`` contains all lines (apart from a last one without end)."""
+        """True if ``head`` contains all lines (apart from an unterminated last line)."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -85,7 +86,7 @@ class Text:
 
     @property
     def is_large(self) -> bool:
-        """True if the file stays on disk, and so is plain ASCII."""
+        """True if the file stays on disk; only plain ASCII files do."""
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
@@ -114,7 +115,7 @@ class Text:
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines after byte ``begin`` from the start, the end and evenly between; all lines of a short text."""
+        """Return lines from the start, the end and evenly in between, after byte ``begin``; of short texts all."""
         data = self._data
         end = self._end
         count = self.some
@@ -184,7 +185,7 @@ def _is_plain(data: bytes) -> bool:
 
 
 def _detect_encoding(data: bytes) -> str:
-    """Return "ascii" or "utf-8" if the data match it, else "latin-1", which accepts any bytes."""
+    """Return "ascii" or "utf-8" if the data are valid in it, else "latin-1", which accepts any bytes."""
     if data.isascii():
         return "ascii"
     try:
@@ -219,7 +220,7 @@ def find_precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        if len(field) > digits:  # a field has no more digits than characters
+        if len(field) > digits:  # a field cannot have more digits than characters
             digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
@@ -236,7 +237,7 @@ def find_precisions(
 
 
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
-    """Return True if the last field of a truncated file is certainly complete, judged by the fields above it.
+    """Return True if the fields above show that the last field of a truncated file is complete.
 
     It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
     of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
@@ -301,7 +302,7 @@ def _decimals(field: str) -> int:
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equally spaced and their step can be written with fewer decimals than this."""
+    """Return True if the times are equally spaced and their step needs fewer decimals than ``decimals``."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
