@@ -19,7 +19,7 @@ NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
 # First: two rates are treated as equal if they differ by less than this share of a cycle over the record.
 # Second: they are exactly equal if they differ by less than this angle [rad], plus what scatter may add.
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
-# Tolerances of locked phases [rad]: of the line of a stretch, and of harmonics.
+# Largest phase error of a locked line [rad]: first for the line of a stretch, second for harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
 # is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).

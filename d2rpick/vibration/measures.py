@@ -117,7 +117,7 @@ def compared(columns: Columns) -> NDArray[np.bool_]:
 
 
 def level_error(energy: Samples | float, level: Samples | float) -> Samples:
-    """Return |sqrt(E(tr)/E(td)) - 1| [-]: the relative amplitude error, of the shape of ``energy``.
+    """Return |sqrt(E(tr)/E(td)) - 1| [-]: the relative amplitude error, in the shape of ``energy``.
 
     NaN where an energy, or the ``level`` at td, is not positive.
 
@@ -150,7 +150,7 @@ def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
 def lock_in_error(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> Samples:
-    """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the locked-in deformation, of the shape of ``tr``.
+    """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the locked-in deformation, in the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
     several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all

@@ -443,7 +443,7 @@ class ModalVibration:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Return True if lines at half the rate of others may belong to a stretch or to modes."""
+        """Return True if it is unclear whether lines at half the rate of others belong to a stretch or to modes."""
         return not self.reading.is_mode.all() and bool(self.others)
 
 

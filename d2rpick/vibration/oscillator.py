@@ -215,7 +215,7 @@ class Oscillator:
         return mass / (self.frame_mass + self.mass)
 
     def _centre(self, state: State) -> tuple[Values, Values]:
-        """Return displacement and velocity of the centre of mass; the velocity is that of eq. (8) of the paper."""
+        """Return the displacement and the velocity (8) of the centre of mass."""
         frame = self._share(self.frame_mass)
         suspended = self._share(self.mass)
         return (

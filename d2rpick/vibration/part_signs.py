@@ -36,7 +36,7 @@ MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = (
     "no few modes have its energy, with the signs that its minima give or on their own"
 )
-# As many parts are named as have this share of the mismatch together.
+# The largest contributors are named until together they make up this share of the mismatch.
 _NAMED_TOGETHER = 0.8
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Largest number of candidates that are judged together. Larger arrays are not faster, and noise makes tens of
 # thousands of candidates per td.
 _MOST: Final = 20_000
-_MORE: Final = 8  # largest growth of the number of td judged together; later td may have many candidates
+_MORE: Final = 8  # largest growth factor of the number of td judged together
 # A candidate gets a note if its residual may be larger by this much [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"

@@ -298,7 +298,7 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
 
 
 def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes for the grade "poor" of the vibration."""
+    """Return the causes why the vibration is graded "poor"."""
     causes = []
     if best.residual is None:
         causes.append(_describe_unknown_direction(situation))
@@ -395,7 +395,7 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes for the grade "fair" of the vibration."""
+    """Return the causes why the vibration is graded "fair"."""
     if best.residual is None:
         return []
     high = best.residual_high or best.residual
