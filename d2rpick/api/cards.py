@@ -83,12 +83,12 @@ def list_solvers() -> Sequence[str]:
     return tuple(SOLVERS)
 
 
-def explain_unknown_solver(name: str) -> str:
+def explain_unknown_solver(name: object) -> str:
     """Return the message for a name that is no solver, with the most similar name of one."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
-    near = suggest_name(name, solvers)
+    near = suggest_name(str(name), solvers)
     return f"{name!r} was found{near}, one of {', '.join(solvers)} was expected"
 
 

@@ -1,3 +1,3 @@
 """Provide the base of all other folders: errors, files, settings, worker processes, and the version of d2rpick."""
 
-__version__ = "0.18.0"
+__version__ = "0.19.0"

@@ -195,20 +195,22 @@ def test_every_residual_of_the_nodes_is_near_the_predicted_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("case", "best"),
-    [("FRAME", 0.3), pytest.param("ROLL", 0.65, marks=pytest.mark.slow)],
+    ("case", "best", "accuracy"),
+    [("FRAME", 0.3, 0.022), pytest.param("ROLL", 0.65, 0.073, marks=pytest.mark.slow)],
 )
-def test_the_histories_of_the_references_give_the_residuals_of_the_results(
-    case: str, best: float
+def test_the_histories_of_the_references_give_the_residuals_of_the_nodes(
+    case: str, best: float, accuracy: float
 ) -> None:
+    """The accuracy is that on the validation page; no residual of the nodes is above the upper bound."""
     reference = d2rpick.read(RESULTS / f"{case.lower()}_reference.csv")
     rows = TOTALS[TOTALS["case"] == case]
-    for row in (rows[0], rows[-1]):
+    for row in rows:
         verdict = d2rpick.verify(
             reference, tr=float(row["tr_s"]), td=float(row["td_s"])
         ).to_dict()
         assert verdict["basis"] == "modal"
-        assert verdict["residual"] == pytest.approx(row["R_predicted"], abs=0.02)
+        assert verdict["residual"] == pytest.approx(row["R_nodes"], abs=accuracy)
+        assert row["R_nodes"] <= verdict["residual_high"]
     chosen = d2rpick.suggest(reference).recommended
     assert chosen is not None
     assert chosen.residual is not None
