@@ -19,7 +19,7 @@ def main() -> None:
     interrupts: list[int] = []
 
     def interrupt(number: int, _: object) -> None:
-        """Raise KeyboardInterrupt, and remember the signal, since the code of a library may swallow the error."""
+        """Raise KeyboardInterrupt, and remember the signal, since library code may swallow the error."""
         interrupts.append(number)
         sys.unraisablehook = lambda _: (
             None

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         Path | Literal[False]
     )  # False means no deck, even if one is in the folder of the run
     Parts = str | int | Iterable[str | int]
-    # A number in the unit of the run, or a text with a unit, such as 64ms.
+    # A number in the unit of the run, or a string with a unit, such as 64ms.
     Time = float | str
 
 _LONGEST_SHOWN: Final = 60  # largest number of characters of a wrong value in a message
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Return a hint on how to write a number that has a decimal comma; empty for other texts.
+    """Return a hint on how to write a number that has a decimal comma; empty for other strings.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Return a hint on how to write a time that has a unit; empty for other texts."""
+    """Return a hint on how to write a time that has a unit; empty for other strings."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))

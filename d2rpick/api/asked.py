@@ -76,7 +76,7 @@ def make_request(
 ) -> Request:
     """Make a request from the arguments; raise TypeError for a wrong type or an unknown argument.
 
-    Times in ``choosing`` may be texts with a unit, which are converted to the unit of the run.
+    Times in ``choosing`` may be strings with a unit, which are converted to the unit of the run.
     """
     if run is not None:
         arguments.check_run("run", run)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 class JudgingOptions(TypedDict, total=False):
     """How a pair is judged.  None stands for the default.
 
-    Times have the unit of the history, or are texts with a unit, such as ``"64ms"``.
+    Times have the unit of the history, or are strings with a unit, such as ``"64ms"``.
 
     ``after``: end of the load (default: found from the record).  ``landing``: time of the next contact after the
     flight; td is earlier by the margin (default: found from the record).  ``margin``: time kept free after the load

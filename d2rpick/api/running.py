@@ -37,7 +37,7 @@ def first(
     after: float | None = None,
     overwrite: bool | None = False,
 ) -> FirstRun:
-    """Write a copy of a deck whose first run switches itself, as ``d2rpick first`` does.
+    """Write a copy of a deck so that its first run switches the parts by itself, as ``d2rpick first`` does.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def study(
     runs : several paths
         Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
     td : float or text, optional
-        When the parts are switched back [time]; a text such as ``"64ms"`` if all runs name the same unit.
+        When the parts are switched back [time]; a string such as ``"64ms"`` if all runs name the same unit.
     td_window : (float, float), optional
         Instead of ``td``: the range in which each run chooses its own td [time]; without both, its longest flight.
     parts, flying, **choosing
@@ -350,7 +350,7 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Return a text: how many of ``runs`` runs are taken from the file, and why other rows were not used."""
+        """Say how many of ``runs`` runs are taken from the file, and why other rows were not used."""
         if self.outdated:
             outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:

@@ -182,7 +182,7 @@ def suggest(
     run : Run
         As `read` gives it, without switching.
     td : float or text
-        When the parts are switched back [time]; a text with a unit, such as ``"64ms"``, if the run names its own.
+        When the parts are switched back [time]; a string with a unit, such as ``"64ms"``, if the run names its own.
     td_window : (float, float)
         Instead of ``td``: the range in which td is chosen [time]; without both, the longest flight.
     parts : number, title or several, optional
@@ -270,7 +270,7 @@ def verify(
     run : Run
         As `read` gives it, without switching.
     tr, td : float or text
-        Switch times [time], or texts such as ``"64ms"``; with ``switched`` they are read off that run where they are
+        Switch times [time], or strings such as ``"64ms"``; with ``switched`` they are read off that run where they are
         not given.
     switched : Run, optional
         A finished run with these switch times, to be compared with ``run``.

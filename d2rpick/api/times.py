@@ -31,9 +31,9 @@ _WITHOUT_RUN: Final = TimeUnit("", "the arguments, which contain no run")
 
 
 class TimeArguments:
-    """Check arguments that are times: numbers in the unit of a run, or texts with a unit, such as "64ms".
+    """Check arguments that are times: numbers in the unit of a run, or strings with a unit, such as "64ms".
 
-    ``find_unit`` returns the unit to which texts are converted.  It is called only if there is such a text, since it
+    ``find_unit`` returns the unit to which strings are converted.  It is called only if there is a string, since it
     may have to open a run.
 
     Examples
@@ -138,7 +138,7 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the unit if there is only one, otherwise an empty text."""
+    """Return the unit if there is only one, otherwise an empty string."""
     return next(iter(units)) if len(units) == 1 else ""
 
 

@@ -16,7 +16,7 @@ UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
 _MOST_NAMED: Final = 20  # largest number of names that one message lists
 
-# Code of the caution on an input that was skipped because of an error of the program.
+# Code of the caution on an input that was skipped because of a bug in the program.
 INTERNAL_ERROR: Final = "internal-error"
 
 

@@ -38,7 +38,7 @@ _TRIES: Final = 5  # number of attempts to read a file that keeps changing
 _TICK: Final = (
     50_000_000  # resolution of most file times [ns]; later changes are visible
 )
-# resolution of file times on file systems that store full seconds [ns]
+# resolution of file times on file systems that store whole seconds [ns]
 _COARSE: Final = 2_000_000_000
 # time to write a byte [ns]; it matters because the file time is set when the last write begins
 _SLOWEST: Final = 5
@@ -48,7 +48,7 @@ _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """Bytes that offer a backward search."""
+    """Bytes that can be searched backward."""
 
     def __len__(self) -> int: ...
 
@@ -72,7 +72,7 @@ def bound(name: str) -> float:
 
 
 def describe_excess(name: str, value: float = float("inf")) -> str:
-    """Return a message if a value exceeds its limit, with the cure; otherwise an empty text.
+    """Return a message if a value exceeds its limit, with the cure; otherwise an empty string.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def wait_for_settled_states(
 
 
 def _settle(name: str, state: FileState) -> FileState:
-    """Return the state of a file, settled if the file has only grown since ``state``."""
+    """Return the state of a file; it counts as settled if the file has only grown since ``state`` was read."""
     now = state if state.settled else _state_of(name)
     return state._replace(settled=True) if now.continues(state) else now
 
@@ -289,7 +289,7 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
 
 
 def append_as_a_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
-    """Append to a file completely or not at all; ``durable`` waits for the disk; an OSError changes nothing."""
+    """Append to a file completely; after an OSError the file is unchanged. ``durable`` waits for the disk."""
     size = None
     try:
         with path.open("ab") as file:
@@ -330,7 +330,7 @@ def parse_record(line: bytes) -> dict[str, Any] | None:
 
 
 def _compute_checksum(text: bytes) -> str:
-    """Return a short checksum of a text."""
+    """Return a short checksum of a string."""
     import hashlib
 
     return hashlib.sha256(text).hexdigest()[:16]

@@ -350,7 +350,7 @@ class PairSuggestion(AnswerAtTd):
 def suggest_in_history(
     history: History, td: float, settings: Settings
 ) -> PairSuggestion:
-    """Rank the candidates for tr at ``td`` and recommend one; RangeError if td lies outside the record."""
+    """Rank the candidates for tr at ``td`` and recommend one; raise RangeError if td lies outside the record."""
     return suggest_at(examine_td(history, td, settings))
 
 

@@ -35,7 +35,7 @@ MOST_IMBALANCE = 0.10
 # Source: dynasupport.com/howtos/general/contact-energy.
 # Negative contact energy has no physical cause but comes from penetrations; Oasys' check allows 5 % of either sign.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# Internal energies below the first share of the run's largest energy, or below the second value, are rounding errors.
+# Internal energies below the share _TINY_SHARE of the run's largest energy, or below _FLOOR, are rounding errors.
 # Single precision and glstat have six to seven digits; LS-DYNA's internal energy starts at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
 # Parts whose internal energy is below this share of the largest part energy are ignored [-].

@@ -265,7 +265,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
-    """Return the run with the surroundings that a deck defines, and warnings; DeckError if the deck cannot be read."""
+    """Return the run with the surroundings from a deck, and warnings; raise DeckError if the deck cannot be read."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,

@@ -33,7 +33,7 @@ class Reference(NamedTuple):
 
     @classmethod
     def of(cls, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the selected energy of an open run; FormatError if it is missing."""
+        """Read the selected energy of an open run; raise FormatError if it is missing."""
         if selection.parts:
             # Imported here to keep start-up fast.
             from d2rpick.flight.momentum import (

@@ -476,7 +476,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the cautions of the card that the plan does not contain: on unverified windows, and on the card itself."""
+    """Return the card's cautions that are not in the plan: about unverified windows and about the card itself."""
     if card is None:
         return []
     failed = tuple(

@@ -385,7 +385,7 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
 
 def encode_text(text: str) -> bytes:
-    """Encode a text. File names may contain lone surrogates for undecodable bytes, which no encoding can write."""
+    """Encode a string. File names may contain lone surrogates for undecodable bytes, which no encoding can write."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 

@@ -1,4 +1,4 @@
-"""Define options for times of a run. A time with a unit stays a text until the unit of the run is known."""
+"""Define options for times of a run. A time with a unit stays a string until the unit of the run is known."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
 class TimeType(NumberType):
-    """A time of the run: a number, or a text such as 64ms that `convert_typed_times` replaces with a number."""
+    """A time of the run: a number, or a string such as 64ms that `convert_typed_times` replaces with a number."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -61,7 +61,7 @@ def convert_typed_times(ctx: click.Context) -> None:
 
 
 def _has_text(value: Any) -> bool:
-    """Return True if a value, or one in a tuple of values, is a text."""
+    """Return True if a value, or any item of a tuple of values, is a string."""
     if isinstance(value, tuple):
         return any(_has_text(single) for single in value)
     return isinstance(value, str)

@@ -443,7 +443,7 @@ class Scope:
         )
 
     def _number(self, name: str) -> Number:
-        """Return the value of a numeric parameter; ExpressionError if it has none."""
+        """Return the value of a numeric parameter; raise ExpressionError if it has none."""
         definition = self.definition(name)
         if definition is None:
             if later := self.definitions(name):

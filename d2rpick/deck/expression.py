@@ -34,7 +34,7 @@ _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi
 
 
 class ExpressionError(Exception):
-    """Raised inside the deck reader for a text that is not a number; the message says why."""
+    """Raised inside the deck reader for a string that is not a number; the message says why."""
 
 
 @lru_cache(4096)  # a quick answer, because most fields are blank or 0
@@ -58,7 +58,7 @@ def parse_number(text: str) -> Number:
 
 
 def is_deck_number(text: str) -> bool:
-    """Return True if `number` can read the text."""
+    """Return True if `number` can read the string."""
     try:
         parse_number(text)
     except ExpressionError:
@@ -68,7 +68,7 @@ def is_deck_number(text: str) -> bool:
 
 @lru_cache(4096)
 def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Return the result of `of_kind` for a text that is a plain number; None if it must be evaluated."""
+    """Return the result of `of_kind` for a string that is a plain number; None if it must be evaluated."""
     return (
         None
         if "&" in text or text[0] == "<"
@@ -79,9 +79,9 @@ def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | 
 def convert_text(
     kind: Callable[[float], Any], text: str, value: Callable[[str], Number]
 ) -> tuple[Any, str]:
-    """Convert a text to a number of a type (int or float).
+    """Convert a string to a number of a type (int or float).
 
-    Return the number and an empty text, or None and the reason.
+    Return the number and an empty string, or None and the reason.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def convert_text(
 
 
 def parse_real(text: str) -> float:
-    """Parse a field as a number: a blank gives 0.0, and a text that is not a number gives NaN."""
+    """Parse a field as a number: a blank gives 0.0, and any other string that is not a number gives NaN."""
     try:
         return float(parse_number(text)) if text.strip() else 0.0
     except ExpressionError:
@@ -107,7 +107,7 @@ def parse_real(text: str) -> float:
 
 
 def find_parameters(text: str) -> tuple[str, ...]:
-    """Return the names of the parameters that a text uses, in lower case.
+    """Return the names of the parameters that a string uses, in lower case.
 
     Examples
     --------
@@ -257,7 +257,7 @@ class _Parser:
         return -value if negative else value
 
     def atom(self) -> Number:
-        """Evaluate a number, a parameter, a constant, a function call or a text in parentheses."""
+        """Evaluate a number, a parameter, a constant, a function call or an expression in parentheses."""
         token = self.tokens.pop(0)
         if token == "(":
             value = self.nested()

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _PIECE: Final = (
     1 << 14
 )  # number of elements processed at once; their arrays fit into the processor's cache
-# Nodes of each face of a brick, in their order as seen from outside.
+# Nodes of each face of a brick, in the order seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),

@@ -244,11 +244,11 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K.
 # The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
 # A load is transmitted first in the stiffest direction, so the period uses the largest lambda.
-# The trace of K, the sum of all k, in place of lambda gives the lower limit of all periods.
+# With the trace of K (the sum of all k) in place of lambda, the same formula gives a lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):
-    """The longest period [time], its lower limit ``least`` [time], and a text that says what oscillates."""
+    """The longest period [time], its lower limit ``least`` [time], and a string that says what oscillates."""
 
     time: float
     least: float

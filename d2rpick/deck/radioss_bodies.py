@@ -186,7 +186,7 @@ def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]
 
 
 def _require_whole_starter(run: RadiossRun) -> Starter:
-    """Return the starter deck; DeckError if it is missing or incomplete.
+    """Return the starter deck; raise DeckError if it is missing or incomplete.
 
     Raises
     ------

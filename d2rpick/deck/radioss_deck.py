@@ -521,7 +521,7 @@ def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Return the ids on lines with fields of 10 columns; a text that is not an id gives -1."""
+    """Return the ids on lines with fields of 10 columns; a string that is not an id gives -1."""
     cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 

@@ -379,7 +379,7 @@ def _read_shell_section(rows: Sequence[str]) -> Section:
 
 
 def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
-    """Return the flags in the first line; a text that is not a flag gives 0."""
+    """Return the flags in the first line; a string that is not a flag gives 0."""
     return [
         card.integer(rows[0], column).value if rows else 0 for column in SOLID_FLAGS
     ]

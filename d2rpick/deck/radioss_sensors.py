@@ -65,7 +65,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Find when a sensor is active: time spans in order, or a text that says what cannot be evaluated.
+    """Find when a sensor is active: time spans in order, or a string that says what cannot be evaluated.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.

@@ -449,7 +449,7 @@ class _Reader:
 
 
 def explain_unread(path: str | None, chain: Sequence[str]) -> str:
-    """Return why an include is not read, or an empty text.
+    """Return why an include is not read, or an empty string.
 
     ``chain`` are the real paths of the files that include it.
     """
@@ -525,7 +525,7 @@ def _has_whole_end(block: Block) -> bool:
 
 
 def _find_sign_of_cut(block: Block, *, main: bool) -> str:
-    """Return the evidence that a file is truncated, or an empty text."""
+    """Return the evidence that a file is truncated, or an empty string."""
     mesh = has_mesh(block)
     radioss = block.head.startswith("/")
     if not block.source.ends_with_line() and not _has_whole_end(block):

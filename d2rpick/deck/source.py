@@ -218,7 +218,7 @@ class SourceFile:
 
     @cached_property
     def marks(self) -> Sequence[int]:
-        """Return the offsets of all keywords and encrypted blocks; DeckError for a file that no solver can read."""
+        """Return the offsets of all keywords and encrypted blocks; raise DeckError if no solver can read the file."""
         first = self.read(0, _FIRST)
         if first.startswith(_GZIP):
             raise DeckError(f"{self.name}: the deck is compressed with gzip; unpack it")
@@ -277,7 +277,7 @@ class SourceFile:
             )
 
     def sha256(self) -> str:
-        """Return the SHA-256 of the bytes; DeckError if the file has changed since it was read."""
+        """Return the SHA-256 of the bytes; raise DeckError if the file has changed since it was read."""
         import hashlib
 
         digest = hashlib.sha256()

@@ -53,7 +53,7 @@ class HeldInMemory:
 
 
 class DeckOnDisk:
-    """Bytes of a file, read on request; DeckError if the file has changed.
+    """Bytes of a file, read on request; raise DeckError if the file has changed.
 
     At least ``window`` bytes are read at a time.
     """

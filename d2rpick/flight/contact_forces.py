@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 # An external contact leaves at least this share of its impulse in the momentum of the model.
 # The share is this small because 1/3 of the impulse of an intermittent contact may fall between two states.
 _INNER: Final = 0.2
-# First: number of pieces of a flight whose mean energies are compared.
-# Second: a mean energy that rises by this share of the highest energy shows a crash.
+# _PIECES: number of pieces of a flight whose mean energies are compared.
+# _RISE: a mean energy that rises by this share of the highest energy shows a crash.
 # In computed flights with many beating modes the mean rises by up to 0.06, in a crash by nearly 1.
 _PIECES: Final = 4
 _RISE: Final = 0.1

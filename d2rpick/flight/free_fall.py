@@ -36,8 +36,8 @@ _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 _REACH_OF_DIGITS = 10.0
 # Tolerances for recognising gravity while a load fades: 5 % in size, direction cosine 0.999 with an axis.
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# If damping takes more than the first share of the momentum in a window,
-# at least the second share of the largest momentum must remain.
+# If damping takes more than the share _DAMPED of the momentum in a window,
+# at least the share _LEFT of the largest momentum must remain.
 _DAMPED, _LEFT = 0.2, 0.05
 # Largest share of the momentum that damping takes between two states.
 _SHOWN = 0.1
@@ -46,12 +46,12 @@ _SHOWN = 0.1
 # If only some of the moving parts are tried, TOLERANCE is used instead, because the rest of their body acts on them.
 _ENOUGH = 3e-3
 # Three limits for finding gravity at right angles to a load of constant direction.
-# First: largest deviation at right angles to the load, in rounding errors.
-# Second: smallest component of an axis at right angles to the load.
-# Third: the deviation along the load must be at least this many times as large.
+# _REACH_OF_NOISE: largest deviation at right angles to the load, in rounding errors.
+# _SEEN: smallest component of an axis at right angles to the load.
+# _CLEARLY: the deviation along the load must be at least this many times as large.
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# First: a fading force falls to this share of its size from the first to the last third of a window.
-# Second: at the end a fading force is at most this share of the weight.
+# _FADED: a fading force falls to this share of its size from the first to the last third of a window.
+# _LITTLE: at the end a fading force is at most this share of the weight.
 _FADED, _LITTLE = 0.6, 0.02
 # Largest momentum across the direction of a straight motion, as a share of the momentum.
 _STRAIGHT = 0.01

@@ -29,15 +29,15 @@ _BAND_RESERVE: Final = 0.25
 # Share of the time before td that is not used for the band. In 45 computed runs the energy entered its band too early,
 # by up to 0.3 of that time, while the load still acted.
 _WAIT: Final = 1 / 3
-# During a contact the energy leaves its central range for a moment; the first share is cut off at each end.
-# A contact changes the energy faster than the vibration does in the second share of the time before td,
-# by the third factor at least. A decaying vibration stays below that rate.
+# During a contact the energy leaves its central range for a moment; the share _OUTER is cut off at each end.
+# A contact changes the energy faster than the vibration does in the share _LATEST of the time before td,
+# by the factor _FASTER at least. A decaying vibration stays below that rate.
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # The level is the mean energy over this share of the quiet time.
-# The level has changed once the mean leaves its band, widened by the band's width.
+# The level has changed once this mean leaves the band of the means before td, widened at both ends by its width.
 _LEVEL: Final = 1 / 8
-# First: a landing is detected by comparison with this share of the time before it.
-# Second: the energy must have at least this many turning points in that time.
+# _KNOWN: a landing is detected by comparison with this share of the time before it.
+# _TURNED: the energy must have at least this many turning points in that time.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
@@ -53,11 +53,11 @@ _DRIFT: Final = 0.35
 _SWINGS: Final = 4
 # Ranges and means of both halves of a flight agree to this share.
 _ALIKE: Final = 0.75
-# First: an energy that falls below this share of its peaks belongs to one vibration, which is at rest at the peaks.
-# Second: an oscillation below this share of the energy of a permanent deformation is ignored.
+# _TO_ZERO: an energy that falls below this share of its peaks belongs to one vibration, which is at rest at the peaks.
+# _HARDLY: an oscillation below this share of the energy of a permanent deformation is ignored.
 _TO_ZERO, _HARDLY = 0.05, 1e-3
 # A body yields in its first oscillation if its energy comes within this share of its later level.
-# The energy may stay within this share of its minimum for at most the second share of the time in which it rises
+# The energy may stay within this share of its minimum for at most the share _MOST_FLAT of the time in which it rises
 # (0.7 for a harmonic motion). It stays there for longer if bodies of the model collide later in the flight.
 _FLAT, _MOST_FLAT = 0.1, 1.0
 # Kinetic energy supplies the energy of yielding, so the sum of both rises by at most this share of that energy.
@@ -199,7 +199,7 @@ def _find_burst(history: History, start: float, td: float) -> float | None:
 
 
 def _find_change_of_level(history: History, start: float, td: float) -> float | None:
-    """Return the first time after ``td`` at which the mean energy leaves its band before td, or None."""
+    """Return the first time after ``td`` at which the mean energy leaves the band that it kept before td, or None."""
     inside = find_window(history.time, start, td)
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:

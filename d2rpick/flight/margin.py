@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 LEAST_MARGIN: Final = 0.03
 # A force is searched for in at least this many states.
 _FEWEST: Final = 3
-# A contact grazes the body if its force stays below the first share of the largest force on the body,
-# or if it changes the momentum by less than the second share of the momentum towards the contact.
+# A contact grazes the body if its force stays below the share _GRAZING_FORCE of the largest force on the body,
+# or if it changes the momentum by less than the share _GRAZING_MOMENTUM of the momentum towards the contact.
 # The surfaces then slide along each other, so a small position error moves the contact to a much earlier time.
 # A landing changes that momentum by more: by 1/4 at the tip of a slender body, and by at least 0.27 within the margin
 # in computed cars and boxes. The grazing contact of a computed car changed it by 0.02.

@@ -42,8 +42,9 @@ _VISIBLE = 100
 # A larger set of parts is preferred only if its window is longer by this factor.
 # A part with a large momentum of its own, such as a sled, loosens the tolerance for the other parts.
 _LONGER = 1.1
-# First: share of the record before td that is searched for attached parts. Second: largest number of states used.
-# Third: the momenta of a body, added up, deviate from a straight line by less than this share.
+# _LOOK_BACK: share of the record before td that is searched for attached parts.
+# _LOOK_STATES: largest number of states used for this search.
+# _CANCELS: the momenta of a body, added up, deviate from a straight line by less than this share.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # A decrease of the summed deviation below this share is treated as rounding error.
 # Without this limit a part of almost no mass would be added and removed endlessly.
@@ -52,8 +53,8 @@ _ROUNDED: Final = 1e-9
 _HELD = 0.01
 # The part momenta add up to the model's momentum within this share, unless a rigid body has absorbed some parts.
 _ALL_OF_IT: Final = 1e-2
-# A body flies separately if it does so for at least the first share of the record,
-# and if its velocity differs by at least the second share.
+# A body flies separately if it does so for at least the share _BY_ITSELF of the record,
+# and if its velocity differs by at least the share _OF_ITS_OWN.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"

@@ -18,18 +18,20 @@ if TYPE_CHECKING:
 
 # First tolerance for a free flight, as a share of the range over the record. A contact exceeds it at once.
 TOLERANCE = 1e-3
-# Any smooth motion obeys a law for a moment, and its misfit grows with the cube of time or faster.
-# At 1/10 of the tolerance such a window shrinks to less than half, whereas a free flight hardly shrinks.
+# Any smooth motion obeys the law of a free flight for a moment; its misfit grows with the cube of time or faster.
+# At 1/10 of the tolerance the window of such a motion shrinks to less than half, whereas a free flight hardly shrinks.
 # Therefore the tolerance is divided by 10 while the window keeps its length, down to the resolution of the numbers.
 # A smoothly fading load shrinks the window too, until the tolerance is below the rest of the load.
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # A vibration leaves at least this share of the window's misfit in its middle half (a smooth load leaves 1/8).
 _RINGS = 1 / 3
-# A flight lasts for at least the first share of the record, and has at least the second number of states.
+# A flight lasts for at least the share SHORTEST of the record, and has at least FEWEST states.
 SHORTEST, FEWEST = 0.05, 12
-# The middle of a window, without the first share at each end, has the misfit of the free flight itself.
-# In the whole window the misfit due to printed digits, which is bounded, may be larger by the second factor.
-# Any other misfit may be larger by the third factor, since its maximum is taken over more states and a longer time.
+# The middle of a window, without the share _ENDS at each end, has the misfit of the free flight itself.
+# In the whole window the misfit due to printed digits, which is bounded, may be larger by the factor
+# _REACH_OF_DIGITS.
+# Any other misfit may be larger by the factor _REACH, since its maximum is taken over more states and
+# a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of any quantity: solvers sum in single precision.
 ROUND_OFF = 1e-7

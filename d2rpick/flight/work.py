@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 # Fewest states from which a load, gravity and damping can be separated: twice the number of unknowns.
 FEWEST_STATES: Final = 6
-# Relative error of the work of gravity from sampling and the sums of the solver; contacts change more.
+# Relative error of the work of gravity, caused by sampling and by the sums of the solver.
+# Contacts change the work by more than this share.
 _OWN_ERROR: Final = 1e-3
 # Relative deviation from a parabola that damping may cause in the work of gravity, if no velocity is written.
 _BENT: Final = 1e-2
@@ -37,7 +38,7 @@ _OF_INTERNAL: Final = 0.1
 # Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number.
 # It exceeds 1 because energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# Losses of kinetic energy below the first share are ignored. Losses above the second are friction, not damping.
+# Losses of kinetic energy below the share _LITTLE are ignored. Losses above _MUCH are friction, not damping.
 # The momentum changes by half of that share.
 _LITTLE, _MUCH = 5e-3, 0.5
 

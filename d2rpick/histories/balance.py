@@ -280,7 +280,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return name and values (n,) of the spring and damper energy; None if it is zero, or all of the energy."""
+    """Return the name and values (n,) of the spring and damper energy; None if it is zero or makes up all energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None

@@ -282,7 +282,7 @@ class OnDisk(Content):
 
 
 class Scattered(OnDisk):
-    """The bytes of a file that is read at few, scattered offsets.
+    """The bytes of a file that is read at a few scattered offsets.
 
     The file is opened for each reading: a run may have written more such files than a process may have open.
     """

@@ -51,8 +51,8 @@ _FEWEST = 0.5
 # End times of databases of one run may differ by this number of output intervals: a killed run lacks some states.
 _ENDS_APART = 2.0
 # Tolerances for an internal energy of the parts above the energy of the model.
-# The first is relative to the largest energy; in solver files the excess is below 0.1 %.
-# The second is the round-off relative to the kinetic energy.
+# _MORE is relative to the largest energy of the model; in solver files the parts exceed it by less than 0.1 %.
+# _ROUND_OFF is relative to the largest kinetic energy.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
@@ -113,7 +113,7 @@ class Database:
         return {}
 
     def branch(self, name: str) -> Database:
-        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); FormatError if it is missing."""
+        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError if missing."""
         reason = self.no_channels if name == "glstat" else self.no_parts
         raise FormatError(f"{self.source}: {reason}")
 
@@ -144,7 +144,7 @@ class Database:
         return None
 
     def find(self, wanted: str) -> str:
-        """Return the column that the user selects by name or, in tables, by number; FormatError lists the columns."""
+        """Return the column that is selected by name or, in tables, by number; else a FormatError lists the columns."""
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:

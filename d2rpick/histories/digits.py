@@ -18,7 +18,7 @@ _DIGITS: Final = 6  # significant digits of a printed time
 # Number of significant digits of a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 
-# Units of time by their names in files and options [s], as texts, because 0.001 is not exact as a double.
+# Units of time by their names in files and options [s], as strings, because 0.001 is not exact as a double.
 _SIZES: Final = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), "1"),
     **dict.fromkeys(("ms", "msec"), "1e-3"),
@@ -36,7 +36,8 @@ _NEVER_MEANT: Final = 0.01
 # If a smaller unit gives a time in this first share, the record more likely ends before the time.
 _HARDLY_MEANT: Final = 0.05
 # A td with fewer states before it is assumed to be in another unit, because such a td hardly saves time.
-# A value within the record in both units needs at least 1000 states, unless it lies before the second state.
+# Such a td and 1000 times its value are both times of the record only if the record has at least 1000 states,
+# or if this td lies before the second state.
 _FIRST_STATES: Final = 10
 
 
@@ -147,7 +148,7 @@ def format_beyond_limit(value: float, limit: float) -> str:
 
 
 def parse_seconds(text: str) -> Decimal | None:
-    """Return a time with a unit exactly [s]; None if the text is not such a time.
+    """Return a time with a unit exactly [s]; None if the string is not such a time.
 
     Examples
     --------
@@ -164,7 +165,7 @@ def parse_seconds(text: str) -> Decimal | None:
 
 
 def convert_to_unit(text: str, unit: str) -> float | None:
-    """Return a time with a unit as a number in another ``unit``; None if the text or the unit is unknown.
+    """Return a time with a unit as a number in another ``unit``; None if it is not a time or has an unknown unit.
 
     Examples
     --------
@@ -185,9 +186,9 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit.
+    """Return a question that asks if an argument outside a ``record`` (n,) was given in a smaller unit.
 
-    It is empty if that does not explain the value.
+    The question is empty if that does not explain the value.
 
     The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
     than its length is assumed to be in the unit of the record.
@@ -211,9 +212,9 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return the question whether an argument at the first states of a ``record`` (n,) in ms or us was given in s.
+    """Return a question that asks if an argument at the first states of a ``record`` (n,) in ms or us was given in s.
 
-    It is empty if that does not explain the value.
+    The question is empty if that does not explain the value.
     """
     values = convert_to_unit_of_record(record, times, unit)
     return _ask_for_unit("s", argument, values) if values else ""
@@ -258,6 +259,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return the question whether an argument was meant in a unit, with the values to give instead."""
+    """Return a question that asks if an argument was meant in a unit, with the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

@@ -228,8 +228,8 @@ class Given:
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
-    known momenta, in their order, NaN if unknown; None if no mass is known. ``forces`` are those of contacts and
-    rigid walls.
+    known momenta, in the order of the parts, NaN if unknown; None if no mass is known. ``forces`` are those of contacts
+    and rigid walls.
     """
 
     momenta: tuple[Momenta, ...] = ()

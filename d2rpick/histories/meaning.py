@@ -30,7 +30,7 @@ EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
 
-# Words for the whole model, or for the file or group of a quantity.
+# Words in the name of a quantity that mean the whole model, or only the file or group that contains the quantity.
 _WHOLE_MODEL_WORDS: Final = frozenset(
     {"global", "globals", "globale", "total", "totals", "totale", "totaal", "whole", "complete", "entire", "all",
      "model", "modell", "modele", "modelo", "system", "sys", "sum", "summe", "gesamt", "gesamte", "gesamtes",

@@ -86,7 +86,7 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
-# A number or range of part ids; a text with more digits is a title.
+# A number or range of part ids; a string with more digits is a title.
 _SHORTEST_BEGINNING: Final = (
     3  # letters from which the beginning of a name identifies it
 )
@@ -126,7 +126,7 @@ def find_energy_unit(name: str) -> str:
 
 
 def check_energy_unit(unit: str) -> str:
-    """Return a unit as it is written, or an empty text if it is no unit of energy.
+    """Return a unit as it is written, or an empty string if it is not a unit of energy.
 
     Examples
     --------
@@ -217,9 +217,9 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question with the most similar name, or an empty text; ``likeness`` (0 to 1) is the least similarity.
+    """Return a question with the most similar name, or an empty string; ``likeness`` (0 to 1) is the least similarity.
 
-    Without a similar name, the only one that begins with the wanted text is proposed.
+    Without a similar name, the only one that begins with the wanted string is proposed.
 
     Examples
     --------
@@ -351,7 +351,7 @@ def select_parts(
 def _match_parts(
     text: str, parts: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
 ) -> Iterator[Part]:
-    """Yield the parts that a text selects: one title, or numbers, ranges and titles between commas."""
+    """Yield the parts that a string selects: one title, or numbers, ranges and titles between commas."""
     whole = titled.get(text.strip().casefold())
     if whole and "," in text:  # a title may contain a comma
         yield _choose_only_part(whole, text, where)
@@ -404,6 +404,6 @@ def list_parts(parts: Sequence[Part]) -> str:
 
 
 def has_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
-    """Return True if texts contain the word "recommended", unless it is the title of a part."""
+    """Return True if strings contain the word "recommended", unless it is the title of a part."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

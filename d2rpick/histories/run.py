@@ -270,7 +270,7 @@ class OpenedRun:
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Parts that are springs and dampers, as far as their energies show it."""
+        """Parts that are springs or dampers, as far as their energies show."""
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
@@ -285,7 +285,7 @@ class OpenedRun:
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of given parts, shape (n, parts) [energy]; FormatError if not written."""
+        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if not written."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:

@@ -83,7 +83,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # files of families are checked at each read
+    families = _open_families(files)  # the files of a family are checked at each read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -185,7 +185,7 @@ def _is_pattern(name: str) -> bool:
 
 
 def _list_later_files(name: str) -> Sequence[str]:
-    """Return the later files of a family in their order: the name of its first file stands for all."""
+    """Return the later files of a family in ascending order: the name of its first file stands for all."""
     folder, first = os.path.split(name)
     match = re.fullmatch(_FAMILY, first)
     if match is None or match["number"]:

@@ -36,7 +36,7 @@ DEEPEST = 0.1
 # Thickness of the curb, which is the end of the sled [m].
 CURB_THICKNESS = 0.05
 # Upper limit of the speed towards floor, curb or ground, from which follows how long no contact is possible.
-# It is the first value times the initial speed, plus the second value, which is the speed after a fall of 1 m [m/s],
+# It is FASTEST times the initial speed, plus FALL, which is the speed after a fall of 1 m [m/s],
 # plus twice the speed of the drop.
 FASTEST, FALL = 4.0, 5.0
 # Contact forces that are less than this apart belong to one contact [s]: corners rattle, and a flight lasts longer.
@@ -264,7 +264,7 @@ class Accounts:
 class BoxMotion:
     """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
-    A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError if that is impossible. ``body`` is
+    A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
     the box while it is rigid, else None.
     """
 

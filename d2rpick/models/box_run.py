@@ -221,7 +221,7 @@ class Recorder:
 
 
 def _count_updates(motion: BoxMotion) -> int:
-    """Return how many bar forces were computed so far."""
+    """Return how many bar forces have been computed so far."""
     return motion.box.evaluations + motion.step.evaluations
 
 

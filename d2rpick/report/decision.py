@@ -82,7 +82,7 @@ def format_rigid_time(best: Candidate) -> str:
 
 
 def format_accuracy(best: Candidate) -> str:
-    """Return the accuracy and the timing tolerance of tr as text; an empty text if neither is known."""
+    """Return the accuracy and the timing tolerance of tr as text; an empty string if neither is known."""
     interval = (
         "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
     )

@@ -142,7 +142,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
 
 
 def _strip_whitespace(text: str) -> str:
-    """Remove whitespace between elements, and reduce whitespace within a text to one blank."""
+    """Remove whitespace between elements, and reduce whitespace within a string to one blank."""
     return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
 
 

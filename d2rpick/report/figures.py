@@ -93,7 +93,7 @@ def note(
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
-    """Write a text at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
+    """Write a string at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
     axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 

@@ -83,7 +83,7 @@ _HATCHES: Final = {
     "re-plan": "//",
     "done": None,
 }  # line styles that are distinguishable without colour
-# First: height of the figure in a file [inch]. Second: height of the axes on a page [inch].
+# _PLAN_HEIGHT: height of the figure in a file [inch]. _PLAN_PANEL: height of the axes on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn.
 _STRIP: Final = 0.07
@@ -92,7 +92,7 @@ _HEADROOM: Final = 1.1
 # Largest number of parts whose energy is drawn.
 # Largest number of parts whose energy is drawn.
 _MOST_PARTS: Final = 6
-# First: height of the figure in a file [inch]. Second: height of one of its axes on a page [inch].
+# _TRADE_HEIGHT: height of the figure in a file [inch]. _TRADE_PANEL: height of one of its axes on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
 # Space next to the first and last td, as a share of the axes, so that lines and marks there are not cut off.
 _AT_EDGE: Final = 0.02
@@ -112,11 +112,11 @@ _PATTERNS: Final = ("-", "--")
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# All grey curves together are as dark as the first number of lines, and none is fainter than the second opacity.
+# All grey curves together are as dark as _DARK lines, and none is fainter than the opacity _FAINTEST.
 _DARK, _FAINTEST = 10, 0.02
 # with more runs than this, lines and marks are thin
 _MANY: Final = 40
-# Time shown before the first tr (first) and after td (second), as shares of the time between them.
+# Time shown before the first tr (_BEFORE) and after td (_AFTER), as shares of the time between them.
 _BEFORE, _AFTER = 0.25, 0.15
 # height of the figure [inch]
 _HEIGHT: Final = 4.0
@@ -385,7 +385,7 @@ def draw_parts(answer: Parts) -> Figure:
 
 
 def _label_run_axes(history: History) -> tuple[str, str]:
-    """Return the labels of the axes of time and energy."""
+    """Return the labels of the time and energy axes."""
     time_label = add_unit("time", history.time_unit)
     return time_label, label_energy(history.energy_unit)
 

@@ -46,7 +46,7 @@ _NOUNS: Final = (
     "error",
     "warning",
     "info message",
-)  # of the severities, in their order
+)  # nouns for the severities, in the same order
 _NOT_XML: Final = (
     "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled at first use
 )
@@ -408,7 +408,7 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Replace the characters of a text that XML 1.0 cannot contain or a terminal does not show."""
+    """Replace the characters of a string that XML 1.0 cannot contain or a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 

@@ -148,8 +148,8 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# First: keys that explain the choice of tr but do not rate the pair.
-# Second: the ratings that ``verify`` shows first, in their order.
+# _OF_TR: keys that explain the choice of tr but do not rate the pair.
+# _FIRST: the ratings that ``verify`` shows first, in the order in which it shows them.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip

@@ -90,7 +90,7 @@ def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
-    """Join elements and texts into one."""
+    """Join elements and strings into one."""
     return Markup(
         between.join(
             child if isinstance(child, Markup) else _replace_markup(child, quote=False)

@@ -47,7 +47,8 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# First: columns that are omitted first if a table would be too wide. Second: columns shown only with ``verbose``.
+# _SPARE: columns that are omitted first if a table would be too wide.
+# _IN_FULL: columns that are shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# If a table is too wide, long words (paths, lists of parts) are split in columns wider than the first width.
-# If that is not enough, words longer than the least width are split too. No number is that long.
+# If a table is too wide, long words (paths, lists of parts) are split in columns wider than _WORD.
+# If that is not enough, words longer than _LEAST are split too. No number is that long.
 _WORD: Final = 32
 _LEAST: Final = 12
-# A formula begins with one of these signs; spreadsheets in some languages also accept their full-width forms.
-# It begins at the start of a cell, or after a semicolon, the cell separator in languages with a decimal comma.
+# A formula begins with =, +, -, @ or, in spreadsheets of some languages, the full-width form of one of them.
+# The formula begins at the start of a cell, or after a semicolon, the cell separator in languages with a decimal comma.
 # A number is not a formula.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# A cell with more letters than this is treated as text, which is wrapped before a column is omitted.
+# A cell with more characters than this is treated as text, which is wrapped before a column is omitted.
 _TEXT: Final = 20
 
 
@@ -111,7 +111,7 @@ def remove_star_column(
 def format_in_line(
     named_texts: Iterable[tuple[str, Cell]], width: int = 0
 ) -> list[str]:
-    """Return lines of a name and a text, aligned at ``width`` letters, by default the length of the longest name."""
+    """Return lines of a name and a text, aligned at ``width`` characters, by default the length of the longest name."""
     lines = list(named_texts)
     width = width or max(len(name) for name, _ in lines)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
@@ -130,8 +130,8 @@ def as_text(
 ) -> str:
     """Return a table as text, with right-aligned numbers and two blanks between columns.
 
-    A table wider than ``width`` first loses the columns in ``spare``, in their order; then the widest columns wrap
-    their text.
+    A table wider than ``width`` first loses the columns in ``spare``, in that order; then the widest columns
+    wrap their text.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def as_text(
 
 
 def wrap_lines(text: str, width: int) -> str:
-    r"""Wrap the lines of a text that are longer than ``width``; continuations are indented to the text after the name.
+    r"""Wrap the lines that are longer than ``width``; continuations are indented to the text after the name.
 
     Examples
     --------
@@ -268,7 +268,7 @@ def _wrap_cells(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]
 
 
 def _wrap_words(text: str, width: int) -> list[str]:
-    """Wrap a text between words. Words that are too long break after the signs that join names, paths and part ids."""
+    """Wrap a string between words. Longer words break after the characters that join names, paths and part ids."""
     from textwrap import TextWrapper
 
     wrapper = TextWrapper(width, break_on_hyphens=False)
@@ -313,7 +313,7 @@ def escape_markdown(text: str) -> str:
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     r"""Return CSV at full precision, with commas, line feeds at line ends, and empty cells for unknown values.
 
-    A text that a spreadsheet would treat as a formula gets a leading apostrophe: names and titles come from files.
+    A string that a spreadsheet would treat as a formula gets a leading apostrophe: names and titles come from files.
 
     Examples
     --------

@@ -133,8 +133,8 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
 
 
 def _count_differences(first: str, second: str) -> int:
-    """Return the number of characters in which two texts of the same length differ; the longer length for other
-    texts.
+    """Return the number of characters in which two strings of the same length differ; the longer length for other
+    strings.
     """
     if len(first) != len(second):
         return max(len(first), len(second))
@@ -288,7 +288,7 @@ def check_deck(
     configuration.verify(RULES)
     case = _read_case(path, content, judge, restarts)
     findings = _remove_consequences(list(_apply_rules(case, configuration)))
-    order = {path: 0}  # the deck itself first, then its includes in their order
+    order = {path: 0}  # the deck itself first, then its includes in order
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(

@@ -331,7 +331,7 @@ def _check_entity_triggers(case: Case) -> Iterator[Objection]:
 
 
 def _list_entities(entities: Entities) -> str:
-    """Return a text that lists the contacts or walls, each with its id, keyword and title."""
+    """Return a string that lists the contacts or walls, each with its id, keyword and title."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found

@@ -331,7 +331,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return, by event that makes a part rigid, the lead part of its rigid body. It is the end of the LRB chain.
+    """Return for each part that an event makes rigid the lead part of its rigid body, the end of the LRB chain.
 
     A part that is not merged leads itself.
     """

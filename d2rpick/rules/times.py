@@ -118,7 +118,7 @@ def _group_closed_windows(
 
 
 def _name_parts(windows: Sequence[SwitchWindow]) -> str:
-    """Return a text that lists the ids of the parts in some windows."""
+    """Return a string that lists the ids of the parts in some windows."""
     return name_units(window.unit.id for window in windows)
 
 

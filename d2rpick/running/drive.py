@@ -45,9 +45,11 @@ JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
 # With it a rigid leg costs a few percent of a deformable one, and its history has enough states to show a contact.
 _STEP_RATIO: Final = 5.0
-# A flight shorter than the wait is reported if it lasted for at least this share of the wait.
+# A flight shorter than the wait (the force-free time that shows a flight) is reported if it lasted for at least
+# this share of the wait.
 _REPORTED: Final = 0.5
-# First: pause between two checks of the solver [s]. Second: time without output after which it is reported [s].
+# _PAUSE: time between two checks of the solver [s].
+# _SILENT: time without output after which the silence of the solver is reported [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
@@ -279,7 +281,7 @@ class Driver:
         self.solver.keep(kept_restarts)
 
     def _is_whole(self, order: Order, cycles: int | None) -> bool:
-        """Return True if a leg left complete restarts, and a history that extends to the end of the leg."""
+        """Return True if a leg wrote complete restart files and a history that extends to the end of the leg."""
         step = (order.until - order.start) / (cycles or 1)
         last_state = order.until - max(3 * self.limits.interval, 2 * step)
         number = order.number
@@ -434,7 +436,7 @@ class Observer:
     def _find_short_flights(
         self, order: Order, wait: float | None
     ) -> tuple[tuple[float, float], ...]:
-        """Return the start and end of each flight in a leg that was a little shorter than the wait."""
+        """Return the start and end of each flight in a leg that was a little too short to be switched."""
         if not wait:
             return ()
         return tuple(

@@ -41,13 +41,13 @@ _CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
 _TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# Errors in the listing of a starter are followed by much output, so more bytes are read from its end (first value).
-# Second: the text with which an error begins. Third: the number of lines of an error.
+# Errors in the listing of a starter are followed by much output, so more bytes are read from its end (_LISTING_SIZE).
+# _ERROR: the characters with which an error begins. _ERROR_LINES: the number of lines of an error.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
 # A restart file is complete if it has at least this share of the size of the starter's restart file.
 _WHOLE: Final = 0.98
-# First: time that a solver is given to stop [s]. Second: pause between two checks [s].
+# _TIME_TO_STOP: time that a solver is given to stop [s]. _PAUSE: time between two checks [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
@@ -103,7 +103,7 @@ class Commands(NamedTuple):
 
 
 def _find_installed(program: str) -> list[str]:
-    """Return the path of a program of the installation, with its arguments; ConfigurationError without one."""
+    """Return the path of a program of the installation, with its arguments; raise ConfigurationError without one."""
     home = os.environ.get(_HOME, "")
     names, arguments = _PROGRAMS[program]
     for name in names:

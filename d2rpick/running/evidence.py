@@ -158,7 +158,7 @@ class GrowingEvidence:
         )
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
-        """Return all flights that lasted for their wait, in ascending order; ``needed`` returns the wait at a state.
+        """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """

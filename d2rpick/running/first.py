@@ -45,7 +45,8 @@ if TYPE_CHECKING:
 
 # The OpenRadioss starter reads /RBODY/OFF from this many engine files. A leg after the end of the run takes one step.
 _MOST_LEGS: Final = 9
-# While the parts are rigid, the largest time step is the wait divided by this number.
+# While the parts are rigid, the largest time step is the wait (the force-free time that shows a flight)
+# divided by this number.
 # A contact is therefore noticed at most one such step late.
 _STEPS_PER_WAIT: Final = 300
 # LS-DYNA: after a switch no contact releases the parts for a time of the wait divided by this number.
@@ -72,7 +73,7 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
-# LS-DYNA. First: loads that act without a contact. Second: the keywords among these that define gravity.
+# LS-DYNA. _PUSHES: keywords of loads that act without a contact. _OF_GRAVITY: those among them that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 # LS-DYNA: offset before a contact, in thicknesses of the thickest shell.
 # It must exceed the contact thickness, which is half of the thickness of each shell.
@@ -269,7 +270,7 @@ def _write_legs(
 
 
 def _explain_wait(wait: Wait) -> str:
-    """Return the note on the wait."""
+    """Return the note on the wait, the force-free time that shows a flight."""
     return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
-# First: share of an oscillation at each end that is not used to measure it, since its ends may be flat.
-# Second: share of half its period that a harmonic motion takes for the rest.
+# _INNER: share of an oscillation at each end that is not used to measure it, since its ends may be flat.
+# _INNER_TIME: share of half its period that a harmonic motion takes for the rest.
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
 # An oscillation whose mean force is below this share of the strongest one so far is a rotation of the body.
 _ROTATION: Final = 0.05
@@ -39,7 +39,7 @@ _AT_REST: Final = 1e-3
 # How an oscillation ends is unknown once it lasts this many times the longest half period before it.
 _MUCH_LONGER: Final = 2.0
 # Longest oscillations, in half periods according to the deck. A longer one is a rotation of the body.
-# The first value is for free oscillations, the second for those under a load.
+# _LONGEST_FREE is for free oscillations, _LONGEST_PUSHED for those under a load.
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
 # Periods are uncertain by 10 %, so a given wait may be as short as this share of half the period.
 _EXACT: Final = 0.9

@@ -21,14 +21,15 @@ LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are equal if they differ by less than this number of states: a history may end one state early.
 _STATES: Final = 1.5
-# First: the solver numbers legs from 1 to 99. Second: once only this many numbers are left,
+# _MOST_LEGS: the solver numbers legs from 1 to 99. _KEPT_BACK: once only this many numbers are left,
 # no further flight is switched, so that the run reaches its end.
 _MOST_LEGS, _KEPT_BACK = 99, 10
-# Shortest deformable leg in a flight, as a share of the wait. tr is the end of the leg that has the higher energy.
+# Shortest deformable leg in a flight, as a share of the wait (the force-free time that shows a flight).
+# tr is the start or the end of this leg, whichever has the higher energy.
 _LEAST: Final = 0.25
-# Length of a deformable leg while the wait is unknown, as a share of the run.
+# Length of a deformable leg while the wait (see _LEAST) is unknown, as a share of the run.
 _UNKNOWN: Final = 0.02
-# Smallest length of a probe, as a share of its rigid time so far (first) and of the run (second).
+# Smallest length of a probe, as a share of its rigid time so far (_OF_FLOWN) and of the run (_OF_RUN).
 # A longer probe computes more after the contact, and a shorter one needs more restarts.
 # Either costs a few percent of a deformable flight.
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
@@ -208,7 +209,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
 
 
 def _follow_window(last: Order, leg: Leg, limits: Limits) -> Order:
-    """Order a deformable leg after td. The flight in which the window ends is not switched again."""
+    """Return the order for a deformable leg after td. The flight in which the window ends is not switched again."""
     load = last.following(LOAD, _determine_load_end(leg, limits))
     return load._replace(switch_after=last.until)
 
@@ -234,7 +235,7 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def _determine_load_end(leg: Leg, limits: Limits) -> float:
-    """Return when the next deformable leg ends: as soon as a current or past flight has lasted for the wait."""
+    """Return when the next deformable leg ends: as soon as a current or past flight has been long enough."""
     now, findings = leg.order.until, leg.findings
     legs_left = _MOST_LEGS - _KEPT_BACK - leg.order.number
     if legs_left <= 0:
@@ -257,7 +258,7 @@ def _determine_load_end(leg: Leg, limits: Limits) -> float:
 def _determine_probe_end(
     legs: Sequence[Leg], tr: float, now: float, limits: Limits
 ) -> float:
-    """Return the end of the next leg of a probe that began at ``tr``; the leg begins ``now``."""
+    """Return the end of the next leg of a probe that began at ``tr``; the leg begins at ``now``."""
     length = max(
         get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * (now - tr),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Share of a processor core that reading may take.
 _SHARE: Final = 0.01
-# First: shortest pause between two reads [s]. Second: longest pause if only new states are read [s].
+# _SHORTEST: shortest pause between two reads [s]. _LONGEST: longest pause if only new states are read [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run that writes nothing for this time is silent [s].
 _SILENT: Final = 60.0

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
 
-    # Returns the wait for a flight since ``start``, from the states up to ``now`` [time]; None if unknown.
+    # Returns the wait: the force-free time [time] that shows a flight since ``start``, from the states up to ``now``.
+    # None if it is unknown.
     Needed = Callable[[float, float], float | None]
 
 # A momentum or contact energy is constant within this share of its largest value so far.

@@ -38,7 +38,7 @@ _ORDERS: Final = (
     4,
     6,
 )  # for a plain vibration, with plastic work, and with a preload
-_LAGS: Final = 64  # 1/3 of the fewest cells, the optimum against noise
+_LAGS: Final = 64  # window of the pencil [cells]: with 1/3 of _MIN_CELLS, noise causes the least error
 _MIN_CELLS: Final = 192
 _MAX_CELLS: Final = 8192  # limits memory to 5 MB; enough for 1000 periods of the energy
 _CELLS_PER_PERIOD: Final = 24  # fewest cells per period of the strongest vibration in E; a preload adds a slower one

@@ -446,7 +446,7 @@ def _make_mode(parameters: Samples, origin: float) -> Mode:
 
 
 def _refuse_without_fit(time: Samples, reason: str) -> Identification:
-    """Return a refusal of a record to which nothing was fitted."""
+    """Return the result that rejects a record to which nothing was fitted."""
     start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
     return Identification(
         None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))

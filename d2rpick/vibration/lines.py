@@ -26,33 +26,33 @@ if TYPE_CHECKING:
 
 # Numbers of exponentials to try. Each line needs two, the mean needs one or more.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# First: a higher order must reduce the prediction error to less than this share of it.
-# Second: below this relative prediction error no higher order is tried.
+# _CLEARLY_BETTER: a higher order must reduce the prediction error to less than this share of it.
+# _PERFECT: below this relative prediction error no higher order is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
 # Longest window of the signal space [states], at most half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
-# First: states of the even grid per period of the fastest relevant line.
-# Second and third: smallest and largest number of states of the grid.
+# _STATES_PER_PERIOD: states of the even grid per period of the fastest relevant line.
+# _FEWEST_STATES, _MOST_STATES: smallest and largest number of states of the grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
 # Times are treated as evenly spaced if they deviate by less than this share of a step, as rounded times do.
 _EVEN: Final = 1e-3
 # A line exceeds white noise if its power is more than this many times the median power.
 _ABOVE_NOISE: Final = 20.0
-# The slowest lines with the first share of the power (without the trend) are relevant, with the second share strong.
+# The slowest lines with the share _ALL_POWER of the power (without the trend) are relevant, with _STRONG_POWER strong.
 # A line of 1 % of the largest height has 1e-4 of the power; if the grid were too coarse, it would be aliased.
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
 # A line that decays early is searched for in this first share of the record.
 _EARLY: Final = 0.25
-# First: fewest cycles of a line in the record. Second: largest damping of a line, as a share of its rate.
-# Third: largest exponent by which a line decays within the record.
+# _LEAST_TURNS: fewest cycles of a line in the record. _MOST_DAMPED: largest damping of a line, as a share of its rate.
+# _MOST_DECAY: largest exponent by which a line decays within the record.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
 # A free vibration does not grow, but noise may make it seem to grow by up to this exponent over the record.
 _MOST_GROWTH: Final = 0.2
-# The mean is a constant plus at most the first number of decays.
-# The exponents of two decays over the record differ by at least the second value.
+# The mean is a constant plus at most _MOST_DECAYS decays.
+# The exponents of two decays over the record differ by at least _SAME_DECAY.
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
-# Smallest height of a relevant line, relative to the strongest line (first), relative to the line to which it is
-# locked (second), and in standard deviations (third).
+# Smallest height of a relevant line, relative to the strongest line (NOTABLE), relative to the line to which it is
+# locked (_NOTABLE_PARTNER), and in standard deviations (ABOVE_SCATTER).
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# First: two rates are treated as equal if they differ by less than this share of a cycle over the record.
-# Second: they are exactly equal if they differ by less than this angle [rad], plus what scatter may add.
+# _SAME_RATE: two rates are treated as equal if they differ by less than this share of a cycle over the record.
+# _EXACT_RATE: they are exactly equal if they differ by less than this angle [rad], plus what scatter may add.
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
-# Largest phase error of a locked line [rad]: first for the line of a stretch, second for harmonics.
+# Largest phase error of a locked line [rad]: for the line of a stretch, and for harmonics.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
 # is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
@@ -28,7 +28,7 @@ _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
 # Two heights are treated as equal if the logarithm of their ratio is below this.
 _SAME_HEIGHT: Final = 0.1
-# Harmonics are searched for at this many of the strongest lines (first), in these orders (second).
+# Harmonics are searched for at this many of the strongest lines (_STRONGEST), in these orders (_HARMONICS).
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
@@ -129,7 +129,7 @@ def _find_side_lines(
 
 
 class ThirdHarmonic(NamedTuple):
-    """The line at three times the rate of a line whose second harmonic is locked to it, in the middle of the window.
+    """The third harmonic of a line whose second harmonic has a locked phase; all heights are those at mid-window.
 
     A stretch has a line and its second harmonic, and so has a spring that stiffens; a third harmonic has only the
     spring.  ``expected`` is its height for that spring, ``measured`` what the record has there in phase with the first

@@ -76,7 +76,8 @@ _TIMES_PER_PERIOD: Final = 16
 # Between these times, each interval is divided into this many parts in which the energy is treated as linear.
 _FINER: Final = 4
 
-# Largest misfit (first) and prediction error (second) of modes that show a flight, relative to the energy range.
+# Largest misfit (_LITTLE_LEFT) and prediction error (_LITTLE_MISSED) of modes that show a flight,
+# relative to the energy range.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # Half-width of the band of R^2 before it is widened for known errors, and how far a solver's structure is from a linear

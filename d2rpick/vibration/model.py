@@ -199,7 +199,7 @@ class Vibration:
         matches = self.profile.minima() if self.profile else ()
         if (
             self.basis == "modal"
-        ):  # The level of the total energy is not a criterion for many modes.
+        ):  # With many modes, the level of the total energy is no criterion.
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(

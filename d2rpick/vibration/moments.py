@@ -256,7 +256,7 @@ class Moments:
 
     @classmethod
     def joined(cls, some: Iterable[Moments]) -> Moments:
-        """Join several moments in their order."""
+        """Join several moments in the order in which they are given."""
         return cls(
             *map(
                 np.concatenate,
@@ -272,7 +272,7 @@ class Moments:
         return np.asarray(self.kind == _KINDS.index(kind))
 
     def at(self, places: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Moments:
-        """Return the moments at given indices, in their order, or those selected by a mask."""
+        """Return the moments at given indices, in the order of the indices, or those selected by a mask."""
         return Moments(self.tr[places], self.kind[places], self.rising[places])
 
     def __len__(self) -> int:

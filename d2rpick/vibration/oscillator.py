@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Limits of stiffness and masses, far from the values in any unit system. Beyond them products and quotients overflow.
+# Limits of stiffness and masses, far outside the values that occur in any unit system.
+# Beyond them, products and quotients overflow.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
@@ -83,7 +84,7 @@ class Oscillator:
 
     @property
     def omega_2(self) -> float:
-        """Return the damped rate of the vibration (4) [1/time]; NaN if overdamped.
+        """Return the damped rate of the vibration, eq. (4) [1/time]; NaN if overdamped.
 
         Examples
         --------

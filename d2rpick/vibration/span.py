@@ -36,13 +36,13 @@ if TYPE_CHECKING:
             """Return the damping [1/time]."""
 
         def energy(self, t: Samples | float) -> Samples:
-            """Return E [energy]."""
+            """Return the internal energy E [energy]."""
 
         def vibration_energy(self, t: Samples | float) -> Samples:
-            """Return V [energy]."""
+            """Return the vibration energy V [energy]."""
 
 
-# Trial windows begin at the first shares of the time before td and end at the second shares of the time after td.
+# Trial windows begin at the shares _BEGINNINGS of the time before td and end at the shares _ENDS of the time after td.
 # Any flight of several periods is mostly filled by one of these windows.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Further windows end before td, by these shares of the time before td, because td may be in the next contact.
@@ -50,7 +50,7 @@ _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits.
 # The distance of each mark is this share of the distance of the next mark.
 _MARKS = 0.87
-# A window that an oscillator describes has at least the first number of periods and the second share of the fitted
+# A window that an oscillator describes has at least _LEAST_PERIODS periods and the share _MOST of the fitted
 # samples. A smaller window may fit by chance, or contain a transition in the record.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
 # The ends of a window do not belong to the flight if a fit without them reduces the scatter below this share.

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 # Largest number of waves. More waves would fit almost any record.
 _MOST: Final = 6
-# First: largest number of samples in the search for rates, whose cost grows with its third power.
-# Second: smallest number of samples with which six waves can be found.
+# _MOST_SAMPLES: largest number of samples in the search for rates, whose cost grows with its third power.
+# _LEAST_SAMPLES: smallest number of samples with which six waves can be found.
 _MOST_SAMPLES, _LEAST_SAMPLES = 400, 36
-# First: fewer waves are preferred if their misfit is at most this many times the misfit of more waves.
-# Second: a relative misfit below this is rounding error.
+# _AS_GOOD: fewer waves are preferred if their misfit is at most this many times the misfit of more waves.
+# _ROUNDING: a relative misfit below this is rounding error.
 _AS_GOOD, _ROUNDING = 1.5, 1e-12
 # Eigenvalues of the product matrix below this share of the largest are rounding errors.
 _ROUNDING_OF_SQUARES: Final = 1e-14

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
 
-# Cures for a pair that is not admissible. The first is for any pair, the second for a recommended pair
-# that its finished switched run contradicts.
+# Cures for a pair that is not admissible. CHOOSE_ANOTHER is for any pair, CHECK_SWITCHED_RUN for a
+# recommended pair that its finished switched run contradicts.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "

@@ -47,7 +47,7 @@ _MOST_HIDDEN: Final = 0.3
 # An energy has crossed its mean once it exceeds it by this share of the standard deviation. Less may be noise.
 _BAND: Final = 0.25
 # Limits of the energy of the vibration error, as a share of the energy of the next contact [-].
-# A pair below the first limit is good, a pair below the second is fair (docs/explanation/validation-vibration.md).
+# A pair below _HARDLY_GOOD is good, a pair below _HARDLY_FAIR is fair (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NAMED: Final = 5  # largest number of parts that a sentence names
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
@@ -312,7 +312,7 @@ def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def _describe_unknown_direction(situation: Situation) -> Cause:
-    """Return the cause "the directions of the deformation at tr and td are unknown", with its cure."""
+    """Return the cause "the directions of the deformation at tr and td are unknown", with its ``cure``."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     return Cause(

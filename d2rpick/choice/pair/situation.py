@@ -344,8 +344,8 @@ def _find_other_models(
         # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
 
-        # The energy alone shows a slightly different flight for each td. Part signs are followed in few, wider windows,
-        # because the vibration itself shows the times at which a load still acts.
+        # The energy alone shows a slightly different flight for each td. Part signs are therefore followed in wider
+        # windows, of which there are only a few: the vibration itself shows the times at which a load still acts.
         around = get_outer_window(history, around)
     models = find_part_signs(history, around)
     is_sign_known = any(model.signed for model in models.values())

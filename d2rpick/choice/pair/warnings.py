@@ -614,7 +614,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """Describe that a switch is worse than a release without vibration, or than the best switch at this td."""
+    """State that a switch is worse than a release without vibration, or than the best switch at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

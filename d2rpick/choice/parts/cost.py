@@ -214,7 +214,7 @@ class CostModel:
         return Amount(cost, tuple(unknown))
 
     def _share(self, amount: Amount, value: float) -> Share:
-        """Return a share if all elements have weights, otherwise None with the reason."""
+        """Return ``value``, a share of the computing cost, if all elements have weights; else None with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
@@ -311,7 +311,7 @@ def format_weights_as_toml(weights: Weights) -> str:
 
 
 def _quote_for_toml(text: str) -> str:
-    """Quote a text as a TOML string."""
+    """Quote a string for a TOML file."""
     import json
 
     return json.dumps(text, ensure_ascii=False)  # TOML does not allow surrogate pairs

@@ -469,7 +469,7 @@ def compute_step_growth(
 
 
 def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
-    """Find the cheap part that absorbs nearly all energy at the start of the landing after the longest flight."""
+    """Find the cheap part that absorbs nearly all the energy at the start of the landing after the longest flight."""
     taken = {
         row.id: row.flight.landing
         for row in rows

@@ -139,7 +139,7 @@ class Common(NamedTuple):
     """One tr for all judged runs, with the window that all share [time]; None with the reason if there is no such tr.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
-    run's own tr by more than 0.05.  ``errors`` are the errors of the runs at this tr, in their order: residuals, or
+    run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
     level errors on the energy alone [-]; None for a run that was not judged.
     """
 

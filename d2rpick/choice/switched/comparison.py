@@ -32,8 +32,9 @@ _AT_REST = 0.01
 # If the energies while rigid and at td differ by more than this share [-], and by more than energies usually change
 # between states, a note says so. Some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# An energy is treated as constant if it changes by less than the first share of the energy
-# and the second share of the vibration [-]. The energy of a rigid body is constant to its printed digits,
+# An energy is treated as constant if it changes by less than the share _STILL of the energy
+# and the share _STILL_OF_VIBRATION of the vibration energy [-].
+# The energy of a rigid body is constant to its printed digits,
 # whereas vibration changes it more between states; but the vibration may be small against plastic work.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-]: a solver switches at the first step after tr,

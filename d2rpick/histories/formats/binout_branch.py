@@ -78,7 +78,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield signs, in the states of one file, that records are lost or misplaced."""
+    """Yield evidence, from the states of one file, that records are lost or misplaced."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))

@@ -277,7 +277,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return the factors and divisors of integer mantissas, by exponent and signs. One of the two is 1.
+    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of them is always 1.
 
     Both are NaN if the conversion would be inexact.
     """

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 _COMMENTS: Final = ("#", "$", "%", "//")
 # Values that spreadsheets write if a computation fails, in English and German.
-# They begin with the comment sign "#", but a line that begins with one of them is a row.
+# They begin with the comment character "#", but a line that begins with one of them is a row.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",

@@ -286,7 +286,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column named like an internal energy, or the only one apart from the time; FormatError otherwise."""
+        """The column whose name means an internal energy, or the only one besides the time; else raise FormatError."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
@@ -295,7 +295,7 @@ class Table(Database):
         )
 
     def find(self, wanted: str) -> str:
-        """Return the channel name of a column given by its name or 1-based number; FormatError lists the columns."""
+        """Return the channel name of a column given by name or 1-based number; else a FormatError lists the columns."""
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = find_column(self.source, self._layout, wanted)
@@ -311,7 +311,7 @@ class Table(Database):
 
     @cached_property
     def time(self) -> Samples:
-        """Times as in the file, shape (n,) [time]; FormatError if they are not those of one run."""
+        """Times as in the file, shape (n,) [time]; raise FormatError if they are not those of one run."""
         find_row = partial(find_line, self._text, self._begin, self._layout, self._time)
         times = check_one_run(
             self._values(self._time), lambda state: f"{self.source}:{find_row(state)}"
@@ -366,7 +366,7 @@ class Table(Database):
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
-        """Return the requested (or default) columns. An unterminated last line must have them."""
+        """Return the requested (or default) columns. A last line without a line end is used only if it has them all."""
         try:
             names = [self.find(wanted) for wanted in selection.energy] or [
                 self.energy_channel

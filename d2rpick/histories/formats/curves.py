@@ -165,7 +165,10 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only one named like an internal energy; otherwise FormatError lists all curves."""
+        """The only curve, or the only one whose name means an internal energy; else raise FormatError.
+
+        The error lists all curves.
+        """
         if len(self.channels) == 1:
             fitting = [0]
         else:
@@ -179,7 +182,7 @@ class Curves(Database):
         return self.channels[fitting[0]]
 
     def find(self, wanted: str) -> str:
-        """Return the name of a curve given by its name or 1-based number; FormatError lists the curves."""
+        """Return the name of a curve given by its name or 1-based number; else a FormatError lists the curves."""
         if (
             wanted.isdecimal()
             and wanted not in self.channels
@@ -219,7 +222,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # parse_cell returns None for a text that is not a number; numpy turns None into NaN
+        # parse_cell returns None for a string that is not a number; numpy turns None into NaN
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:

@@ -183,7 +183,7 @@ class D3plot(Database):
         return self._rows[:, columns].astype(np.float64)
 
     def _column(self, index: int) -> Samples:
-        """Return a word of all states as doubles, shape (n,)."""
+        """Return one word of every state as doubles, shape (n,)."""
         return self._rows[:, index].astype(np.float64)
 
 

@@ -54,7 +54,7 @@ class Geometry:
         self._airbag_geometry = self._left_nodes = 0
 
     def pass_over(self) -> None:
-        """Skip all sections in their order."""
+        """Skip all sections, one after the other."""
         self._material_types()
         self.at += self._control["ialemat"]
         self._sph_flags()

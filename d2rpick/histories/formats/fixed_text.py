@@ -304,7 +304,10 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        """Return True if a block has the last number of the previous block, or is recognised as complete."""
+        """Return True if a block is complete: it contains the number with which the previous block ends.
+
+        Without a previous block, the grammar decides.
+        """
         if previous is None:
             return self._grammar.whole(layout)
         return previous.last in layout.fields
@@ -409,7 +412,7 @@ class Blocks(Database):
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Return True if all blocks equal their examples from the first anchor to the last number.
+        """Return True if all blocks have the characters of their examples from the first anchor to the last number.
 
         Return False unchecked if that is most of a block: comparing whole blocks costs no more.
         """
@@ -420,7 +423,7 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return True if the blocks of one sequence equal their example from the first anchor to the last number."""
+        """Do the same as `_alike` for the blocks of one sequence, which have one example."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)

@@ -101,7 +101,7 @@ class Glstat(Blocks):
         self.time = self._columns[_TIME]
 
     def channel(self, name: str) -> Samples:
-        """Return the values of the line ``name``, shape (n,); FormatError unless every state has it once."""
+        """Return the values of the line ``name``, shape (n,); raise FormatError unless every state has it once."""
         if name not in self._columns:
             wanted = [name]
             # a request for another line is usually followed by more requests

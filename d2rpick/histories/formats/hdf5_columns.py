@@ -69,7 +69,7 @@ class Column(NamedTuple):
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Return its values, shape (size,), from the ``content`` of a file; FormatError if one is not finite."""
+        """Return its values, shape (size,), from the ``content`` of a file; raise FormatError if one is not finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -168,7 +168,7 @@ def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
 
 
 def check_finite(values: Any, path: str, source: str) -> Samples:
-    """Return ``values`` as read-only doubles that callers can share; FormatError unless all are finite."""
+    """Return ``values`` as read-only doubles that callers can share; raise FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
     is_finite = np.isfinite(numbers)
     if not is_finite.all():
@@ -406,7 +406,7 @@ def _read_attribute_text(value: object) -> str:
 
 
 def _split_titles(value: object) -> list[str]:
-    """Return the names in an array of texts, or in one text with commas."""
+    """Return the names in an array of strings, or in one string with commas."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
         return [_read_attribute_text(entry) for entry in value.tolist()]
     text = _read_attribute_text(value)
@@ -414,7 +414,7 @@ def _split_titles(value: object) -> list[str]:
 
 
 def _read_pickled_names(value: object) -> list[str]:
-    """Return the names in a list of texts that pandas pickled."""
+    """Return the names in a list of strings that pandas pickled."""
     return [
         name.decode("raw-unicode-escape")
         for name in _PICKLED_NAME.findall(bytes(_read_attribute_text(value), "utf-8"))

@@ -120,7 +120,10 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column named like an internal energy, or next to the time; otherwise FormatError lists all."""
+        """The only column whose name means an internal energy, or else the only column besides the time.
+
+        Raise a FormatError that lists all columns if there is no such column.
+        """
         return _find_only_energy(self._columns, self._named_time, self.source).path
 
     def find(self, wanted: str) -> str:
@@ -129,7 +132,7 @@ class Columns(Database):
 
     @cached_property
     def time(self) -> Samples:
-        """Values of the time column, shape (n,) [time]; FormatError if they are not those of one run."""
+        """Values of the time column, shape (n,) [time]; raise FormatError if they are not those of one run."""
         path = self._time_column.path
         times = check_one_run(
             self._load(self._time_column),
@@ -312,7 +315,7 @@ def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
 
 
 def _read_line(group: h5py.Group, name: str) -> str:
-    """Return a text that was saved as an array of one string, empty if there is none."""
+    """Return a string that was saved as an array of one element; an empty string if there is none."""
     if name not in group:
         return ""
     values = np.ravel(group[name][()])

@@ -111,7 +111,7 @@ class Records:
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
-        """Return the reals in their bytes (n, width), shape (n,); NaN for bytes that are not a number."""
+        """Decode bytes of shape (n, width) as reals of shape (n,); NaN where the bytes are not a number."""
         # a NaN is refused later, unless the value is not used
         with np.errstate(invalid="ignore"):
             return fields.view(">f4").ravel().astype(np.float64)
