@@ -181,12 +181,12 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         assert "strip_0004.out: the solver failed" in result.stderr
         result = run(*prepare_drive(tmp_path, "--resume"))
         assert (
-            "leg 4 failed again before its first state: the leg before it is computed again"
+            "engine run 4 failed again before its first state; computing the engine run before it again"
             in result.stderr
         )
     if fault in ("empty", "cut"):
         assert (
-            "leg 3: it left no whole restart or history, and is begun again"
+            "engine run 3: its restart file or history is incomplete; computing it again"
             in result.stderr
         )
     check_finished_run(json.loads(result.stdout), tmp_path)
