@@ -89,7 +89,7 @@ def write_module() -> str:
     judging = write_class(
         "JudgingOptions(TypedDict, total=False)",
         "How a pair is judged.  None stands for the default.\n\n"
-        '    Times have the unit of the history, or are texts with a unit, such as ``"64ms"``.',
+        '    Times have the unit of the history, or are strings with a unit, such as ``"64ms"``.',
         list_arguments(of_cards),
     )
     choosing = write_class(
