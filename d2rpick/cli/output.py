@@ -76,7 +76,7 @@ IN_WORDS: Final = {
 }  # output forms that already explain why nothing is recommended
 
 
-class Verdict(Protocol):
+class VerdictOnPair(Protocol):
     """Verdict on a pair of times, which determines the exit code."""
 
     @property
@@ -211,7 +211,9 @@ class Output:
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
-    def finish_by_verdict(self, decision: Verdict | None, min_quality: str) -> None:
+    def finish_by_verdict(
+        self, decision: VerdictOnPair | None, min_quality: str
+    ) -> None:
         """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``; a message names the limit."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
