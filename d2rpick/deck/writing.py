@@ -413,7 +413,7 @@ def read_block(block: Block) -> bytes:
     return content if content.endswith(b"\n") else content + b"\n"
 
 
-# Legs of a driven run, which are chosen while the run is computed.
+# The functions below write the engine runs of a driven run, whose times are chosen while it is computed.
 
 
 class DrivenDeck(NamedTuple):

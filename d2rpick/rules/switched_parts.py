@@ -331,9 +331,9 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return for each part that an event makes rigid the lead part of its rigid body, the end of the LRB chain.
+    """Return the lead part of the rigid body of each part in ``first``.
 
-    A part that is not merged leads itself.
+    The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """
     leads = {
         part: event.line.lead.value for part, event in first.items() if event.line.lead

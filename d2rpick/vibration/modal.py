@@ -34,7 +34,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.lines import Complex, Exponentials, Grid, Prediction
+    from d2rpick.vibration.lines import (
+        Complex,
+        Exponentials,
+        Grid,
+        Prediction,
+        Spectrum,
+    )
+    from d2rpick.vibration.locked_lines import ThirdHarmonic
 
     Mask = NDArray[np.bool_]
 
@@ -520,6 +527,31 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     )
 
 
+def _correlate_neighbours(remainder: Samples) -> float:
+    """Return the correlation of neighbouring states of the remainder, at least 0: the share that is no white noise."""
+    products = np.sum(remainder[1:] * remainder[:-1])
+    power = max(float(np.sum(remainder**2)), 1e-300)
+    return float(np.clip(products / power, 0.0, 1.0))
+
+
+def _separate_stretches_from_springs(
+    spectrum: Spectrum, grid: Grid, scatter: float
+) -> tuple[tuple[StretchLine, ...], list[ThirdHarmonic]]:
+    """Return the stretches among the lines, and the third harmonics of the lines that may be of stiffening springs."""
+    locked = find_stretches(spectrum.lines, grid.span, scatter)
+    thirds = {
+        stretch: measure_third_harmonic(stretch, spectrum, grid.time, scatter)
+        for stretch in locked
+        if not stretch.swings
+    }
+    stretches = tuple(
+        stretch
+        for stretch in locked
+        if stretch.swings or not thirds[stretch].is_of_spring
+    )
+    return stretches, [third for third in thirds.values() if third.may_be_of_spring]
+
+
 def _read(
     grid: Grid,
     prediction: Prediction,
@@ -536,26 +568,9 @@ def _read(
     noise = spectrum.error
     remainder = spectrum.rest
     scatter = noise * np.sqrt(2 / grid.time.size)
-    shared = float(
-        np.sum(remainder[1:] * remainder[:-1])
-        / max(float(np.sum(remainder**2)), 1e-300)
-    )
-    systematic = float(np.clip(shared, 0.0, 1.0))
-    locked = find_stretches(spectrum.lines, grid.span, scatter)
-    thirds = {
-        stretch: measure_third_harmonic(stretch, spectrum, grid.time, scatter)
-        for stretch in locked
-        if not stretch.swings
-    }
-    springs = [third for third in thirds.values() if third.may_be_of_spring]
-    stretches = tuple(
-        stretch
-        for stretch in locked
-        if stretch.swings or not thirds[stretch].is_of_spring
-    )
-    may_be_spring = any(
-        third.may_be_of_spring and not third.is_of_spring for third in springs
-    )
+    systematic = _correlate_neighbours(remainder)
+    stretches, springs = _separate_stretches_from_springs(spectrum, grid, scatter)
+    may_be_spring = any(not third.is_of_spring for third in springs)
     is_mode = _mask_modes(spectrum.lines, stretches)
 
     plain = Reading(

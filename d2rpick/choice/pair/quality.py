@@ -250,7 +250,7 @@ class Quality(NamedTuple):
 
     @property
     def grade(self) -> str:
-        """The worse of the two grades."""
+        """The worse of the grades of the motion and of the vibration."""
         return min((self.motion.grade, self.vibration.grade), key=GRADES.index)
 
     @property
