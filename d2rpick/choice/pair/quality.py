@@ -340,12 +340,12 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     if share is None or share <= POOR_KINETIC_SHARE:
         return Cause(
             reason,
-            "choose another tr or td; d2rpick explore lists them",
+            "look for another tr or td with d2rpick explore",
             needs_other_times=True,
         )
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "choose another td; d2rpick explore lists them",
+        "look for another td with d2rpick explore",
         needs_other_times=True,
     )
 
@@ -405,7 +405,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "choose another td; d2rpick explore lists them",
+                "look for another td with d2rpick explore",
                 needs_other_times=True,
             )
         )
