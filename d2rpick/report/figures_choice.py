@@ -231,12 +231,12 @@ def _draw_energy(
     ):
         label = "_" if number else "admissible tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=NEUTRAL, linewidth=0, label=label)
-    for acceptable, fill, name in (
+    for admissible, fill, name in (
         (True, NEUTRAL, "admissible"),
         (False, "none", "not admissible"),
     ):
         marked = [
-            candidate for candidate in candidates if candidate.acceptable == acceptable
+            candidate for candidate in candidates if candidate.admissible == admissible
         ]
         if marked:
             label = name if len(candidates) > 1 else "tr"

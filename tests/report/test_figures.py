@@ -88,6 +88,16 @@ def test_few_candidates_are_marks_acceptable_or_not() -> None:
     assert len(motion.lines) == 4  # both motions, tr and td
 
 
+def test_a_recommended_tr_of_a_large_residual_is_marked_as_admissible() -> None:
+    """Its residual of 0.58 hardly matters in the next contact, so the pair may be used with care."""
+    run = d2.read(ROOT / "sample_data/rollover_box.matsum")
+    answer = d2.suggest(run, td=0.345455, parts="1,2")
+    assert require(answer.decision).verdict == "use with care"
+    labels = [marks.get_label() for marks in answer.plot().axes[0].collections]
+    assert "admissible" in labels
+    assert "not admissible" not in labels
+
+
 def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.064)
     better = require(answer.clearly_better)
