@@ -443,7 +443,9 @@ class History:
         return self.time[inside], self.energy[inside]
 
 
-def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
+def select_states(
+    record: Record, states: slice | NDArray[np.bool_ | np.intp]
+) -> Record:
     """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
     size = record.time.size
     rows = {}

@@ -380,8 +380,8 @@ class Observer:
             parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
         )
         self._looks = Looks(selection, inventory)
-        self._given, self._of_deck = wait, of_deck
-        self._evidence, self._motion = GrowingEvidence(), InnerMotion(None, of_deck)
+        self._waits = (wait, of_deck)
+        self._evidence, self._motion = GrowingEvidence(), InnerMotion(*self._waits)
 
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
@@ -395,7 +395,7 @@ class Observer:
         states, follows = self._looks.new_states(names)
         if not follows:
             self._evidence = GrowingEvidence()
-            self._motion = InnerMotion(None, self._of_deck, wait_before)
+            self._motion = InnerMotion(*self._waits, wait_before)
         if states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
@@ -408,50 +408,32 @@ class Observer:
     def _find_flight(self, order: Order, history: History) -> LegFindings:
         """Return the findings of a deformable leg."""
         now = float(history.time[-1])
-        flights = self._evidence.flights(self._get_needed_wait)
+        flights = self._evidence.flights(self._motion.needed)
         free = self._evidence.free_since(now)
-        shown_wait = self._motion.wait(free, now)
-        wait = self._get_needed_wait(free, now)
-        idle = shown_wait is not None and shown_wait.source == "at-rest"
-        why = shown_wait.reason if shown_wait else ""
-        if self._given is not None and not idle:
-            longer = shown_wait is not None and shown_wait.time > self._given
-            why = f"as given, but {why}" if longer else "as given"
+        wait = self._motion.wait(free, now)
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
+        # Flights that were a little too short to be switched.
+        short_flights = tuple(
+            (start, end)
+            for start, end in self._evidence.pauses(order.start)
+            if wait is not None
+            and end - start >= _REPORTED * wait.time
+            and start >= order.switch_after
+        )
         return LegFindings(
             free=free,
-            wait=wait,
-            why=why,
+            wait=wait.time if wait else None,
+            why=wait.reason if wait else "",
             flies=flies,
             tr=tr,
-            idle=idle,
-            short=self._find_short_flights(order, wait),
+            idle=wait is not None and wait.source == "at-rest",
+            short=short_flights,
             swing=self._motion.longest_swing(now),
             steady_from=swing.flight if swing else 0.0,
             swing_warning=swing.told if swing else "",
         )
-
-    def _find_short_flights(
-        self, order: Order, wait: float | None
-    ) -> tuple[tuple[float, float], ...]:
-        """Return the start and end of each flight in a leg that was a little too short to be switched."""
-        if not wait:
-            return ()
-        return tuple(
-            (start, end)
-            for start, end in self._evidence.pauses(order.start)
-            if end - start >= _REPORTED * wait and start >= order.switch_after
-        )
-
-    def _get_needed_wait(self, start: float, now: float) -> float | None:
-        """Return the wait after ``start`` [time]: the user's, or the record's if nothing vibrates; None if unknown."""
-        shown_wait = self._motion.wait(start, now)
-        at_rest = shown_wait is not None and shown_wait.source == "at-rest"
-        if self._given is not None and not at_rest:
-            return self._given
-        return shown_wait.time if shown_wait else None
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:

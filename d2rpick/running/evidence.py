@@ -24,11 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.running.witness import Needed
 
-# tr is good if the internal energy is at least this far from its minimum within one wait, as a share of its range.
-# In computed runs a tr in a trough kept half of the energy that td should have, a tr at a peak at least 0.9 of it.
-_HIGH: Final = 0.75
 # Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
@@ -38,10 +36,9 @@ class GrowingEvidence:
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
-        self._of_parts: list[GrowingWitness] = []
-        self._of_model: list[GrowingWitness] = []  # has at most one item
-        # The evidence that still grows for each set of parts, keyed by the indices of the parts.
-        self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
+        self._witnesses: list[GrowingWitness] = []
+        # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
+        self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         # For each state, the parts that have moved so far, and whether they have the complete momentum of the model.
         self._moved, self._complete = GrowingColumn(), GrowingColumn()
@@ -55,22 +52,23 @@ class GrowingEvidence:
     @property
     def witnesses(self) -> list[GrowingWitness]:
         """Evidence of each set of parts, and at last of the model if it has a momentum or contact energy."""
-        return [*self._of_parts, *self._of_model]
+        return sorted(self._witnesses, key=_is_of_model)
 
     def take(self, states: History) -> None:
         """Append states, which must have the same quantities as the states so far."""
         self._record.add(states)
+        balance = states.balance
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)
-        balance = states.balance
         if of_parts is not None:
             self._add_parts(of_parts, of_model, balance)
-        self._add_model(of_model, balance)
-        contact_precision = balance.precision if balance else EXACT
-        for witness in self.witnesses:
-            momenta = of_model if witness.parts is None else of_parts
-            precision = momenta.precision if momenta else EXACT
-            witness.follow(precision, contact_precision)
+        if of_model is not None:
+            columns = _make_columns(of_model.time, of_model.of((0,)), balance)
+            self._add((0,), None, columns, (of_model, balance))
+        elif balance is not None and balance.sliding is not None:
+            motionless = np.zeros((balance.time.size, 3))
+            columns = _make_columns(balance.time, motionless, balance)
+            self._add((), None, columns, (None, balance))
 
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
@@ -85,33 +83,39 @@ class GrowingEvidence:
         if of_model is not None:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
-        origin = self._complete.size
         moved = self._add_moved(momenta)
         self._complete.add(are_complete)
-        part_numbers = range(len(momenta.parts))
-        for stretch in find_stretches(are_complete):
-            if stretch.start > 0:
-                self._going_on.clear()
-            for members in dict.fromkeys(_list_sets(momenta)):
-                if members not in self._going_on:
-                    self._begin(members, momenta, origin + stretch.start)
-                other_parts = sorted({*part_numbers} - {*members})
-                self._going_on[members].add(
-                    time=momenta.time[stretch],
-                    momentum=momenta.of(members)[stretch],
-                    contact=_get_contact_energy(balance, momenta.time, stretch),
-                    alone=np.asarray(~moved[stretch][:, other_parts].any(axis=1)),
-                )
-        if are_complete.size and not are_complete[-1]:
-            self._going_on.clear()
+        for members in dict.fromkeys(_list_sets(momenta)):
+            columns = _make_columns(momenta.time, momenta.of(members), balance)
+            # Contact energy shows collisions between bodies, which do not change the total momentum.
+            # Once other parts move, it shows their contacts too and is no longer used.
+            other_parts = sorted({*range(len(momenta.parts))} - {*members})
+            columns[moved[:, other_parts].any(axis=1), 1] = np.nan
+            parts = tuple(momenta.parts[number] for number in members)
+            self._add(members, parts, columns, (momenta, balance), are_complete)
 
-    def _begin(self, members: tuple[int, ...], momenta: Momenta, origin: int) -> None:
-        """Begin to collect evidence for a set of parts at a state."""
-        assert momenta.parts is not None
-        parts = tuple(momenta.parts[number] for number in members)
-        witness = GrowingWitness(members, parts, origin)
-        self._going_on[members] = witness
-        self._of_parts.append(witness)
+    def _add(
+        self,
+        members: tuple[int, ...],
+        parts: tuple[Part, ...] | None,
+        columns: Samples,
+        written: tuple[Momenta | None, Balance | None],
+        is_used: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Append states to the evidence of a set of parts, which begins anew after states that are not used.
+
+        ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
+        """
+        key = None if parts is None else members
+        used = np.ones(len(columns), np.bool_) if is_used is None else is_used
+        precisions = [table.precision if table else EXACT for table in written]
+        for stretch in find_stretches(used):
+            if stretch.start > 0 or key not in self._going_on:
+                self._going_on[key] = GrowingWitness(members, parts)
+                self._witnesses.append(self._going_on[key])
+            self._going_on[key].add(columns[stretch], *precisions)
+        if used.size and not used[-1]:
+            self._going_on.pop(key, None)
 
     def _add_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
         """Record which parts have changed their momentum by each of these states, and return that, shape (k, parts)."""
@@ -137,33 +141,13 @@ class GrowingEvidence:
             moving = tuple(number for number, moves in enumerate(moved) if moves)
             yield slice(begin, end), moving, are_complete
 
-    def _add_model(self, momenta: Momenta | None, balance: Balance | None) -> None:
-        """Append the momentum and contact energy of the whole model to its evidence, if one of them is written."""
-        members: tuple[int, ...] = ()
-        momentum: Samples | None = None
-        if momenta is not None:
-            members = (0,)
-            time, momentum = momenta.time, momenta.of(members)
-        elif balance is not None and balance.sliding is not None:
-            time = balance.time
-        else:
-            return
-        if not self._of_model:
-            self._of_model.append(GrowingWitness(members, None, 0))
-        self._of_model[0].add(
-            time=time,
-            momentum=momentum,
-            contact=_get_contact_energy(balance, time),
-            alone=np.ones(time.size, np.bool_),
-        )
-
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
         """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         for witness in self.witnesses:
-            witness.look(needed, self._find_gravity)
+            witness.examine(needed, self._find_gravity)
         candidates = [
             (flight, float(witness.time[-1]))
             for witness in self.witnesses
@@ -191,42 +175,29 @@ class GrowingEvidence:
             return 0.0
         momenta = find_momenta(history, of_parts=witness.parts is not None)
         assert momenta is not None
-        is_used = np.zeros(momenta.time.size, np.bool_)
-        for begin, end in ((0, first), (first, last)):
-            count = min(end - begin + 1, _GRAVITY_STATES)
-            states = np.linspace(begin, end, count).round().astype(np.intp)
-            is_used[witness.origin + states] = True
-        so_far = select_states(momenta, is_used)
+        times = witness.time[[0, first, last]]
+        begin, start, end = np.searchsorted(momenta.time, times).tolist()
+        states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
+        so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
             return 0.0
-        start = int(np.searchsorted(so_far.time, witness.time[first]))
         laws = get_laws_of(so_far, witness.members, history.balance)
-        return laws.gravity(start, so_far.time.size - 1)
+        return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
         """Return when the force-free time that lasts up to a time began; without states, return that time itself."""
         starts = [time]
-        for witness in self.witnesses:
+        for witness in self._witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
             if state >= 0 and time <= witness.time[-1]:
                 starts.append(float(witness.time[witness.free[state]]))
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return all force-free intervals that ended after ``since`` and were shorter than the wait."""
-        if not self.witnesses:
-            return ()
-        going_on = [
-            witness for witness in self.witnesses if witness in self._going_on.values()
-        ]
-        witness = going_on[0] if going_on else self.witnesses[-1]
-        time = witness.time
-        starts = time[np.array(witness.free, np.intp)]
-        is_over = starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2
-        ends = 1 + np.flatnonzero(is_over & (time[1:] > since))
-        pauses = [(float(starts[end - 1]), float(time[end])) for end in ends.tolist()]
-        flight_ends = {flight.end for flight in witness.flights}
-        return tuple(pause for pause in pauses if pause[1] not in flight_ends)
+        """Return all force-free times that ended after ``since``, before they were seen as flights."""
+        for witness in sorted(self._going_on.values(), key=_is_of_model):
+            return tuple(pause for pause in witness.pauses if pause[1] > since)
+        return ()
 
     def contact_after(self, start: float, least: int = FEWEST) -> float | None:
         """Return the first state after ``start`` at which a force acts; None if no force does [time].
@@ -237,11 +208,13 @@ class GrowingEvidence:
         begin = max(start, float(self.history.time[0]))
         for witness in self.witnesses:
             first = int(np.searchsorted(witness.time, start))
-            state_count = witness.time.size
-            if witness.time[0] <= begin and first + least <= state_count:
-                last = witness.last_without(first)
-                at_end = last == state_count - 1
-                return None if at_end else float(witness.time[last + 1])
+            if witness.time[0] <= begin and first + least <= witness.time.size:
+                after_a_force = np.flatnonzero(np.array(witness.free) > first)
+                return (
+                    float(witness.time[after_a_force[0]])
+                    if after_a_force.size
+                    else None
+                )
         return None
 
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
@@ -270,15 +243,6 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def range_of_energy(
-    history: History, now: float, wait: float
-) -> tuple[float, float, float]:
-    """Return the lowest and highest internal energy within the last wait, and the lowest energy that is good for tr."""
-    energy = history.between(now - wait, now)[1]
-    low, high = float(energy.min()), float(energy.max())
-    return low, high, low + _HIGH * (high - low)
-
-
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
     """Return a flight whose own evidence ended at ``last_time`` with the end that other evidence shows."""
     if flight.end is not None:
@@ -292,33 +256,37 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
     return flight._replace(end=next(ends, None))
 
 
-def _get_contact_energy(
-    balance: Balance | None, time: Samples, states: slice = slice(None)
-) -> Samples | None:
-    """Return the contact energy at the ``states`` of these times; None if the file does not contain it there."""
-    if balance is None or balance.sliding is None or balance.time.size != time.size:
-        return None
-    return balance.sliding[states]
+def _is_of_model(witness: GrowingWitness) -> bool:
+    """Return True if evidence is of the whole model, which is used after that of parts."""
+    return witness.parts is None
 
 
-def _list_sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts that may fly together: the chosen parts, these with all connected parts, and all parts.
+def _sample_states(first: int, last: int) -> Samples:
+    """Return the states from ``first`` to ``last``, or some of them if there are too many."""
+    return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
+
+
+def _make_columns(time: Samples, momentum: Samples, balance: Balance | None) -> Samples:
+    """Return time, contact energy and momentum as columns (k, 5). The energy is NaN if it is not written."""
+    contact = np.full(time.size, np.nan)
+    if (
+        balance is not None
+        and balance.sliding is not None
+        and balance.time.size == time.size
+    ):
+        contact = balance.sliding
+    return np.column_stack([time, contact, momentum])
+
+
+def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
+    """Return the sets of parts that may fly together: the chosen parts with all connected parts, and all parts.
 
     Parts are given by their numbers in the momenta.
     """
     assert momenta.parts is not None
-    chosen = tuple(momenta.flying or momenta.chosen)
-    yield chosen
-    number_of_part = {part.id: number for number, part in enumerate(momenta.parts)}
-    chosen_ids = {momenta.parts[number].id for number in chosen}
-    joined_ids = {
-        part_id
-        for body in momenta.surroundings.bodies()
-        if chosen_ids & {*body}
-        for part_id in body
-    }
-    joined = {
-        number_of_part[part_id] for part_id in joined_ids if part_id in number_of_part
-    }
-    yield tuple(sorted({*chosen, *joined}))
-    yield tuple(range(momenta.values.shape[1]))
+    ids = [part.id for part in momenta.parts]
+    joined = {ids[number] for number in momenta.flying or momenta.chosen}
+    bodies = [{*body} for body in momenta.surroundings.bodies()]
+    joined = joined.union(*(body for body in bodies if body & joined))
+    body_numbers = tuple(number for number, part in enumerate(ids) if part in joined)
+    return body_numbers, tuple(range(len(ids)))

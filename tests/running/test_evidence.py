@@ -16,6 +16,7 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
+from d2rpick.running.events import find_events
 from d2rpick.running.evidence import GrowingEvidence, highest_energy
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.witness import Quiet
@@ -90,14 +91,15 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
 
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
-    history = record(name)
     with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
-        find_quiet_times(history, follow_inner_motion(history, 0.002).needed)
+        find_events(*take_whole_record(record(name), 0.002))
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
     history = cut_history(record(CAR), 0.14)
-    last = find_quiet_times(history, follow_inner_motion(history, 0.022).needed)[-1]
+    evidence, motion = take_whole_record(history, 0.022)
+    assert find_events(evidence, motion)
+    last = evidence.flights(motion.needed)[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
     assert last.wait == 0.022
 
