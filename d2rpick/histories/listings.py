@@ -165,10 +165,8 @@ def read_timing(path: str) -> Timing:
         If the file cannot be read, or has no usable summary of CPU times.
     """
     data = _read_listing(path)
-    timing = None
-    if _SUMMARY in data:
-        timing = _read_radioss_timing(path, data)
-    elif _TIMING in data:
+    timing = find_radioss_timing(path, data)
+    if timing is None and _TIMING in data:
         timing = _read_d3hsp_timing(path, data)
     if timing is None or not timing.cycles or not 0 < timing.elements <= timing.total:
         raise FormatError(
@@ -212,8 +210,10 @@ def _read_listing(path: str) -> bytes:
         ) from None
 
 
-def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing; a missing number gives 0."""
+def find_radioss_timing(name: str, data: bytes) -> Timing | None:
+    """Return the CPU times of a Radioss listing; None without a summary; a missing number gives 0."""
+    if _SUMMARY not in data:
+        return None
     summary = data[data.rindex(_SUMMARY) :]
     numbers = []
     for pattern in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES):

@@ -16,6 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
+
 from d2rpick.base.errors import (
     ConfigurationError,
     D2RPickError,
@@ -23,9 +25,12 @@ from d2rpick.base.errors import (
     make_printable,
 )
 from d2rpick.histories.formats.radioss_th import TimeHistory
+from d2rpick.histories.listings import find_radioss_timing
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
+
+    from d2rpick.histories.history import Samples
 
 # Paths of the programs in an installation, and their arguments.
 _PROGRAMS: Final = {
@@ -37,8 +42,6 @@ _PROGRAMS: Final = {
 }
 _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
-_CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
-_TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
 # Errors in the listing of a starter are followed by much output, so more bytes are read from its end (_LISTING_SIZE).
@@ -252,12 +255,9 @@ class Solver:
 
     def took(self, number: int) -> tuple[int | None, float | None]:
         """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
-        listing = _read_tail(self.file(number, ".out"))
-        cycles, seconds = _CYCLES.findall(listing), _TOTAL.findall(listing)
-        return (
-            int(cycles[-1]) if cycles else None,
-            float(seconds[-1]) if seconds else None,
-        )
+        path = self.file(number, ".out")
+        timing = find_radioss_timing(str(path), _read_tail(path))
+        return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
         """Return True if a leg, or the starter (0), has left complete restarts of all domains.
@@ -278,14 +278,13 @@ class Solver:
                 return False
         return True
 
-    def came_to(self, number: int, end: float) -> bool:
-        """Return True if the history of a leg has a state at or after a time [time]."""
+    def read_times(self, number: int) -> Samples:
+        """Return the times of the states in the history of a leg [time]; none if it cannot be read."""
         path = self.history(number)
         try:
-            times = TimeHistory(path.read_bytes(), str(path)).time
+            return TimeHistory(path.read_bytes(), str(path)).time
         except (FormatError, OSError):
-            return False
-        return bool(times.size) and float(times[-1]) >= end
+            return np.empty(0)
 
     def started_well(self) -> bool:
         """Return True if the starter has ended without an error and left a complete restart."""
