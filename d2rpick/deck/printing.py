@@ -33,11 +33,7 @@ from d2rpick.deck.printed_card import (
     write_number,
 )
 from d2rpick.deck.radioss_columns import (
-    DELAY,
-    FORCE_SENSOR,
     RUN,
-    SENSOR_INPUTS,
-    STOP,
 )
 from d2rpick.deck.switch_sets import (
     Waiting,
@@ -361,9 +357,6 @@ def _print_radioss_contact(
     windows, _, _ = _check_run(windows, printing)
     kind, number, pushes = _find_force(printing)
     timing = find_sensor_timing(windows, pushes)
-    delay = DELAY.write(Tdelay=write_number(timing.wait, 20))
-    force = FORCE_SENSOR.write(ID=number, Dir="NF", Fmin=-1.0)
-    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{delay}\n{force}\n"
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
         (timing.latest, math.inf)
     ]
@@ -371,7 +364,8 @@ def _print_radioss_contact(
         f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).",
         *_BY_FORCE,
     )
-    sensors = _write_sensors(spans, printing.sensor, [sensor])
+    force = (kind, number, timing.wait)
+    sensors = _write_sensors(spans, printing.sensor, force)
     return _print_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
 
 
@@ -449,33 +443,26 @@ def _print_sensors(
 
 
 def _write_sensors(
-    spans: Sequence[Times], first: int, further: Sequence[str] = ()
+    spans: Sequence[Times], first: int, force: tuple[str, int, float] | None = None
 ) -> tuple[str, int]:
     """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines all of them.
 
-    It is active in each of ``spans`` and while one of ``further`` is active; these texts have a placeholder for their
-    id.
+    It is active in each of ``spans``, and while a ``force`` acts, given by the arguments of `write_force_sensor`.
     """
-    from d2rpick.deck.radioss_sensors import NEVER
+    from d2rpick.deck.sensor_cards import (
+        write_any_of,
+        write_force_sensor,
+        write_time_sensor,
+    )
 
-    clock = "/SENSOR/TIME/{}\ndeformable\n"
-    kinds = []
-    for start, stop in spans:
-        delay = DELAY.write(Tdelay=write_number(start, 20))
-        end = STOP.write(Tstop=write_number(min(stop, NEVER), 20))
-        kinds.append(f"{clock}{delay}\n{end}\n")
-    kinds += further
-    texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
-    last = first
-    for number, next_sensor in enumerate(
-        range(first + 1, first + len(kinds)), start=first + len(kinds)
-    ):
-        inputs = SENSOR_INPUTS.write(sens_ID1=last, sens_ID2=next_sensor)
-        texts.append(
-            f"/SENSOR/OR/{number}\ndeformable\n{DELAY.write(Tdelay=0)}\n{inputs}\n"
-        )
-        last = number
-    return "".join(texts), last
+    texts = [
+        write_time_sensor(number, "deformable", start, stop)
+        for number, (start, stop) in enumerate(spans, start=first)
+    ]
+    if force:
+        texts.append(write_force_sensor(first + len(spans), *force))
+    combined, last = write_any_of(range(first, first + len(texts)), "deformable")
+    return "".join([*texts, combined]), last
 
 
 def _check_run(

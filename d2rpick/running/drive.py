@@ -328,14 +328,13 @@ class Observer:
             self._motion.take(states, self._evidence)
         history = self._evidence.history
         if order.rigid:
-            start = float(history.time[0])
-            return LegFindings(contact=self._evidence.contact_after(start))
+            return LegFindings(contact=self._evidence.find_contact())
         return self._find_flight(order, history)
 
     def _find_flight(self, order: Order, history: History) -> LegFindings:
         """Return the findings of a deformable leg."""
         now = float(history.time[-1])
-        flights = self._evidence.flights(self._motion.needed)
+        flights = self._evidence.flights(self._motion.wait)
         free = self._evidence.free_since(now)
         wait = self._motion.wait(free, now)
         flies = bool(flights) and flights[-1].end is None

@@ -55,17 +55,20 @@ def find_events(
     RangeError
         If a given wait is too short.
     """
-    flights = evidence.flights(motion.needed)
+    flights = evidence.flights(motion.wait)
     rigid_times = evidence.rigid_times()
     history = evidence.history
     if decided is None:
         decided = {}
     events: list[Event] = []
     for flight in flights:
-        events += _describe_flight(history, motion, flight, decided)
+        if flight.wait.source == "given":
+            longest = motion.longest(flight.seen)
+            check_wait(flight.wait.time, longest, ", ".join(history.source))
+        events += _describe_flight(history, flight, decided)
     events = [event for event in events if not _is_rigid(event.tr, rigid_times)]
     if history.time.size and not (flights and flights[0].start <= history.time[0]):
-        push = evidence.contact_after(float(history.time[0]), 1)
+        push = evidence.find_contact(fewest=1)
         if push is not None:
             events.append(Event("load", push, push, "a force acts"))
     events += _describe_rigid_times(history, rigid_times)
@@ -97,22 +100,13 @@ def _describe_rigid_times(
 
 
 def _describe_flight(
-    history: History, motion: InnerMotion, flight: Quiet, decided: Decided
+    history: History, flight: Quiet, decided: Decided
 ) -> Iterator[Event]:
     """Yield the events of a flight: its start, the advised switch, and its contact."""
     key = (flight.start, flight.seen)
     events = decided.get(key)
     if events is None:
-        wait = motion.wait(flight.start, flight.seen)
-        assert wait is not None
-        if wait.source == "given":
-            check_wait(
-                wait.time, motion.longest(flight.seen), ", ".join(history.source)
-            )
-        events = (
-            _describe_start(flight, wait.reason),
-            *_suggest_switch(history, flight, at_rest=wait.source == "at-rest"),
-        )
+        events = (_describe_start(flight), *_suggest_switch(history, flight))
     if flight.end is not None or any(event.tr is not None for event in events):
         decided[key] = events
     yield from events
@@ -123,7 +117,7 @@ def _describe_flight(
         yield Event("contact", flight.end, flight.end, message)
 
 
-def _describe_start(flight: Quiet, reason: str) -> Event:
+def _describe_start(flight: Quiet) -> Event:
     """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
     quantity = "contact energy"
     if flight.source == "momentum":
@@ -133,29 +127,29 @@ def _describe_start(flight: Quiet, reason: str) -> Event:
         landing = f"on level ground it lands at about {flight.level:.4g}"
     message = (
         f"{quantity} is constant within {flight.left:.1e} of its maximum for {flight.seen - flight.start:.4g}; "
-        f"required force-free time {flight.wait:.4g}: {reason}; {landing}"
+        f"required force-free time {flight.wait.time:.4g}: {flight.wait.reason}; {landing}"
     )
-    return Event("flight", flight.start, flight.seen, message, flight.wait, flight.left)
+    return Event(
+        "flight", flight.start, flight.seen, message, flight.wait.time, flight.left
+    )
 
 
-def _suggest_switch(
-    history: History, flight: Quiet, *, at_rest: bool
-) -> Iterator[Event]:
+def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
     """Advise when to switch in a flight: at once if nothing vibrates, else while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
     """
-    if at_rest:
+    if flight.wait.source == "at-rest":
         message = "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
         yield _advise(flight.seen, flight.seen, message, flight)
         return
-    last = flight.seen + flight.wait
+    last = flight.seen + flight.wait.time
     end = np.inf if flight.end is None else flight.end
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
         if now >= end:
             return
-        energies_so_far = history.between(now - flight.wait, now)[1]
+        energies_so_far = history.between(now - flight.wait.time, now)[1]
         low, high = float(energies_so_far.min()), float(energies_so_far.max())
         level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
         if energy >= low + _HIGH * (high - low):
@@ -164,7 +158,7 @@ def _suggest_switch(
             return
         if now == flight.seen:
             message = f"not yet: {level}; waiting until {last:.6g} for its maximum"
-            yield Event("later", last, now, message, flight.wait)
+            yield Event("later", last, now, message, flight.wait.time)
     later_times = history.between(last, history.time[-1])[0]
     if history.time[-1] > last < end:
         tr = highest_energy(history, flight.seen, last)
@@ -176,7 +170,7 @@ def _suggest_switch(
 
 
 def _advise(tr: float, seen: float, message: str, flight: Quiet) -> Event:
-    return Event("switch", tr, seen, message, flight.wait, tr=tr)
+    return Event("switch", tr, seen, message, flight.wait.time, tr=tr)
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:

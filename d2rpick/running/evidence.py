@@ -199,22 +199,16 @@ class GrowingEvidence:
             return tuple(pause for pause in witness.pauses if pause[1] > since)
         return ()
 
-    def contact_after(self, start: float, least: int = FEWEST) -> float | None:
-        """Return the first state after ``start`` at which a force acts; None if no force does [time].
+    def find_contact(self, fewest: int = FEWEST) -> float | None:
+        """Return the first state at which a force acts [time]; None if none does. The record begins without a force.
 
-        No force acts at ``start``, as in a rigid leg that begins in flight.  A witness is used if it has at least
-        ``least`` states from there on.
+        A witness is used if it has at least ``fewest`` states from the first one of the record on.
         """
-        begin = max(start, float(self.history.time[0]))
         for witness in self.witnesses:
-            first = int(np.searchsorted(witness.time, start))
-            if witness.time[0] <= begin and first + least <= witness.time.size:
-                after_a_force = np.flatnonzero(np.array(witness.free) > first)
-                return (
-                    float(witness.time[after_a_force[0]])
-                    if after_a_force.size
-                    else None
-                )
+            begins = witness.time[0] <= self.history.time[0]
+            if begins and witness.time.size >= fewest:
+                contacts = witness.time[np.array(witness.free) > 0].tolist()
+                return contacts[0] if contacts else None
         return None
 
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:

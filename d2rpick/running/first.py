@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
-from d2rpick.deck.engine_files import write_bodies_off, write_numbers, write_step_limit
+from d2rpick.deck.engine_files import EngineFile, write_engine_lines
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.deck.printed_card import (
@@ -25,6 +25,12 @@ from d2rpick.deck.radioss_bodies import find_bodies
 from d2rpick.deck.radioss_deck import find_bodies_kept_off
 from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.reader import read_deck
+from d2rpick.deck.sensor_cards import (
+    write_any_of,
+    write_force_sensor,
+    write_sensor_of_sensors,
+    write_time_sensor,
+)
 from d2rpick.deck.switch_sets import (
     Waiting,
     write_deformable_lines,
@@ -213,24 +219,19 @@ def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
     """Write a sensor that detects a contact force within the wait, and a sensor that detects a flight."""
-    cards: list[str] = []
-    for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
-        row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-        cards.append(
-            f"/SENSOR/{kind}/{sensor}\nforce, or shortly after\n{write_number(wait, 20):>20}\n{row}\n"
-        )
-    any_force, next_id = first_id, first_id + len(contacts)
-    for sensor in range(first_id + 1, first_id + len(contacts)):
-        cards.append(
-            f"/SENSOR/OR/{next_id}\nany force\n{0:20d}\n{any_force:10d}{sensor:10d}\n"
-        )
-        any_force, next_id = next_id, next_id + 1
-    no_force, late_enough, flight = next_id, next_id + 1, next_id + 2
-    start = f"{write_number(first_switch, 20):>20}"
-    cards += [
-        f"/SENSOR/NOT/{no_force}\nno force\n{0:20d}\n{any_force:10d}\n",
-        f"/SENSOR/TIME/{late_enough}\nfrom then on\n{start}\n",
-        f"/SENSOR/AND/{flight}\nflight\n{0:20d}\n{no_force:10d}{late_enough:10d}\n",
+    forces = [
+        write_force_sensor(number, *contact, wait)
+        for number, contact in enumerate(contacts, start=first_id)
+    ]
+    ids = range(first_id, first_id + len(contacts))
+    combined, any_force = write_any_of(ids, "any force")
+    no_force, late_enough, flight = range(any_force + 1, any_force + 4)
+    cards = [
+        *forces,
+        combined,
+        write_sensor_of_sensors("NOT", no_force, "no force", any_force),
+        write_time_sensor(late_enough, "from then on", first_switch),
+        write_sensor_of_sensors("AND", flight, "flight", no_force, late_enough),
     ]
     return _Sensors("".join(cards), any_force, flight)
 
@@ -245,26 +246,18 @@ def _write_legs(
 ) -> dict[str, str]:
     """Write the engine files, alternately deformable and rigid. The first one is rigid if the parts fall from rest."""
     (leg,) = run.legs
-    other_nodes = tuple(
+    other_nodes = [
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
-    )
+    ]
     leg_count = _MOST_LEGS - at_rest
     files = {}
     for number in range(1, leg_count + 1):
         rigid = number % 2 == at_rest
-        lines = [f"/RUN/{leg.name}/{number}", f"{leg.stop.value!r:>20}"]
+        file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
+        lines = [*write_engine_lines(file, leg.name, bodies.nodes, other_nodes)]
         if number < leg_count:
             sensor = sensors.contact if rigid else sensors.flight
             lines += ["/STOP/LSENSOR", str(sensor), "0 0 0 0 0 0"]
-        if rigid:
-            lines += [
-                "/RBODY/ON",
-                *write_numbers(bodies.nodes),
-                *write_step_limit(largest_step),
-            ]
-            lines += write_bodies_off(other_nodes)
-        else:
-            lines += write_bodies_off((*bodies.nodes, *other_nodes))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     return files
 

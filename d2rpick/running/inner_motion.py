@@ -289,13 +289,8 @@ class InnerMotion:
                 )
         so_far.append(longest)
 
-    def needed(self, start: float, now: float) -> float | None:
-        """Return the wait after ``start``, from the states up to ``now`` [time]; None if it is unknown."""
-        wait = self.wait(start, now)
-        return wait.time if wait else None
-
     def wait(self, start: float, now: float) -> Wait | None:
-        """Return the wait of `needed` with its reason."""
+        """Return the wait of a flight since ``start``, from the states up to ``now`` [time]; None if it is unknown."""
         longest = self.longest(now)
         if self._given is not None:
             reason = "as given"

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import Law
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
+    from d2rpick.running.inner_motion import Wait
 
-    # Returns the wait: the force-free time [time] that shows a flight since ``start``, from the states up to ``now``.
-    # None if it is unknown.
-    Needed = Callable[[float, float], float | None]
+    # Returns the wait of a flight since ``start``, from the states up to ``now``; None if it is unknown.
+    Needed = Callable[[float, float], Wait | None]
 
 # A momentum or contact energy is constant within this share of its largest value so far.
 # Sums in single precision have errors of 1/10 of this.
@@ -52,8 +52,8 @@ class Quiet(NamedTuple):
         State at which the wait was over [time].
     end : float or None
         First state at which a force acts [time]; None if the record ends before.
-    wait : float
-        Force-free time that shows a flight [time].
+    wait : Wait
+        Force-free time that showed the flight.
     source : str
         "momentum" or "contact-energy".
     left : float
@@ -69,7 +69,7 @@ class Quiet(NamedTuple):
     start: float
     seen: float
     end: float | None
-    wait: float
+    wait: Wait
     source: str
     left: float
     gravity: float = 0.0
@@ -192,12 +192,12 @@ class GrowingWitness:
                 and self._shows_forces[state]
             ):
                 wait = needed(start, now)
-                if wait is not None and now - start >= wait:
+                if wait is not None and now - start >= wait.time:
                     self._see(first, state, wait, find_gravity(self, first, state))
             self._start = start
         self._examined_count = len(self.free)
 
-    def _see(self, first: int, state: int, wait: float, gravity: float | None) -> None:
+    def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
         """Add a flight since ``first`` that is seen at a state. Without ``gravity``, only set when to test again."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
