@@ -24,6 +24,7 @@ from d2rpick.deck.printed_card import (
 from d2rpick.deck.radioss_bodies import find_bodies
 from d2rpick.deck.radioss_deck import find_bodies_kept_off
 from d2rpick.deck.radioss_run import find_parts_off, read_run
+from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.sensor_cards import (
     write_any_of,
@@ -37,7 +38,7 @@ from d2rpick.deck.switch_sets import (
     write_header,
     write_rigid_lines,
 )
-from d2rpick.running.checks import NO_CONTACT, contacts_of, refuse_held
+from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def _make_radioss_card(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
         )
     _refuse_loads(run.starter)
-    contacts = list(contacts_of(run.starter))
+    contacts = list_forces(run.starter)
     if not contacts:
         raise DeckError(f"{path}: {NO_CONTACT}")
     at_rest = after is None and _falls_from_rest(run, inventory, parts)

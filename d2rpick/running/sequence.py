@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
+from d2rpick.deck.engine_files import MOST_LEGS
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.window import FEWEST
 
@@ -21,9 +22,8 @@ LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are equal if they differ by less than this number of states: a history may end one state early.
 _STATES: Final = 1.5
-# _MOST_LEGS: the solver numbers legs from 1 to 99. _KEPT_BACK: once only this many numbers are left,
-# no further flight is switched, so that the run reaches its end.
-_MOST_LEGS, _KEPT_BACK = 99, 10
+# Once only this many numbers of legs are left, no further flight is switched, so that the run reaches its end.
+_KEPT_BACK: Final = 10
 # Shortest deformable leg in a flight, as a share of the wait (the force-free time that shows a flight).
 # tr is the start or the end of this leg, whichever has the higher energy.
 _LEAST: Final = 0.25
@@ -200,9 +200,9 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order = _follow_window(last, findings, limits)
     else:
         order = _follow_load(legs, limits)
-    if order.number > _MOST_LEGS:
+    if order.number > MOST_LEGS:
         raise D2RPickError(
-            f"the run needs more than {_MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
+            f"the run needs more than {MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
         )
     return order
 
@@ -214,7 +214,7 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
         findings.flies
         and findings.free >= last.switch_after
         and limits.end - last.until > _WORTH * limits.end
-        and last.number <= _MOST_LEGS - _KEPT_BACK
+        and last.number <= MOST_LEGS - _KEPT_BACK
     )
     if not switches:
         return _order_load(last, findings, limits)
@@ -233,7 +233,7 @@ def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
     """Order a deformable leg that ends as soon as a current or past flight has been long enough."""
     now, end = last.until, limits.end
-    legs_left = _MOST_LEGS - _KEPT_BACK - last.number
+    legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
         return last.following(LOAD, end)
     in_flight = (
