@@ -19,7 +19,7 @@ from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -40,9 +40,12 @@ class GrowingEvidence:
         # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
         self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        # For each state, the parts that have moved so far, and whether they have the complete momentum of the model.
-        self._moved, self._complete = GrowingColumn(), GrowingColumn()
+        self._has_moved: NDArray[np.bool_] = np.zeros((1, 1), np.bool_)
+        # For each state, True if the part momenta add up to the momentum of the model.
+        self._complete = GrowingColumn()
         self._largest_momentum = 0.0
+        # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
+        self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
     @property
     def history(self) -> History:
@@ -60,7 +63,8 @@ class GrowingEvidence:
         balance = states.balance
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)
-        if of_parts is not None:
+        self.moving = []
+        if of_parts is not None and of_parts.time.size:
             self._add_parts(of_parts, of_model, balance)
         if of_model is not None:
             columns = _make_columns(of_model.time, of_model.of((0,)), balance)
@@ -83,14 +87,19 @@ class GrowingEvidence:
         if of_model is not None:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
-        moved = self._add_moved(momenta)
         self._complete.add(are_complete)
+        has_moved = self._find_moved(momenta)
+        moves = has_moved & are_complete[:, np.newaxis]
+        changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
+        for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
+            numbers = tuple(np.flatnonzero(moves[begin]).tolist())
+            self.moving.append((slice(begin, end), numbers))
         for members in dict.fromkeys(_list_sets(momenta)):
             columns = _make_columns(momenta.time, momenta.of(members), balance)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
             # Once other parts move, it shows their contacts too and is no longer used.
             other_parts = sorted({*range(len(momenta.parts))} - {*members})
-            columns[moved[:, other_parts].any(axis=1), 1] = np.nan
+            columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
             parts = tuple(momenta.parts[number] for number in members)
             self._add(members, parts, columns, (momenta, balance), are_complete)
 
@@ -117,29 +126,16 @@ class GrowingEvidence:
         if used.size and not used[-1]:
             self._going_on.pop(key, None)
 
-    def _add_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Record which parts have changed their momentum by each of these states, and return that, shape (k, parts)."""
+    def _find_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
+        """Return which parts have changed their momentum by each of these states, shape (k, parts)."""
         if self._first_momenta is None:
-            self._first_momenta = momenta.values[0]
-        moved = (momenta.values != self._first_momenta).any(axis=2)
-        if self._moved.size:
-            moved[0] |= self._moved.rows[-1]
-        self._moved.add(np.logical_or.accumulate(moved, axis=0))
-        return self._moved.rows[-len(moved) :]
-
-    def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
-        """Split the last ``count`` states wherever a part begins to move or momentum begins to be missing.
-
-        Gives for each piece its states, the numbers of the parts that move, and whether the momenta are complete.
-        """
-        states = np.column_stack(
-            [self._moved.rows[-count:], self._complete.rows[-count:]]
-        )
-        changes = 1 + np.flatnonzero((states[1:] != states[:-1]).any(axis=1))
-        for begin, end in pairwise([0, *changes.tolist(), count]):
-            *moved, are_complete = states[begin].tolist()
-            moving = tuple(number for number, moves in enumerate(moved) if moves)
-            yield slice(begin, end), moving, are_complete
+            self._first_momenta = momenta.values[:1]
+            self._has_moved = np.zeros((1, momenta.values.shape[1]), np.bool_)
+        changed = (momenta.values != self._first_momenta).any(axis=2)
+        changes = np.concatenate([self._has_moved, changed])
+        has_moved = np.logical_or.accumulate(changes, axis=0)[1:]
+        self._has_moved = has_moved[-1:]
+        return has_moved
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
         """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
@@ -179,8 +175,6 @@ class GrowingEvidence:
         begin, start, end = np.searchsorted(momenta.time, times).tolist()
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
-        if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0
         laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(states.index(start), len(states) - 1)
 

@@ -230,7 +230,7 @@ class InnerMotion:
         self, momenta: Momenta, masses: Samples
     ) -> Iterator[tuple[_HalfPeriod, _Motion]]:
         """Follow the momenta of heavy parts relative to the centre of mass of all moving parts."""
-        for states, moving, complete in self._evidence.alike(momenta.time.size):
+        for states, moving in self._evidence.moving:
             members = [number for number in moving if masses[number] > 0]
             whole = float(masses[members].sum())
             heavy = tuple(
@@ -238,10 +238,10 @@ class InnerMotion:
                 for number in members
                 if _HEAVY < masses[number] / whole < 1 - _HEAVY
             )
-            if heavy != self._heavy or not complete:
+            if heavy != self._heavy:
                 self._going_on.clear()
             self._heavy = heavy
-            if not heavy or not complete:
+            if not heavy:
                 continue
             time = momenta.time[states]
             self._parts_since = min(self._parts_since, float(time[0]))
