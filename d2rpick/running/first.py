@@ -12,7 +12,6 @@ from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
 from d2rpick.deck.engine_files import EngineFile, write_engine_lines
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.pieces import find_inner_period
 from d2rpick.deck.printed_card import (
     PHYSICS,
     PrintedCard,
@@ -34,9 +33,7 @@ from d2rpick.deck.sensor_cards import (
 )
 from d2rpick.deck.switch_sets import (
     Waiting,
-    write_deformable_lines,
-    write_header,
-    write_rigid_lines,
+    write_set_pair,
 )
 from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -46,7 +43,6 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_bodies import SwitchedBodies
-    from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
@@ -140,19 +136,16 @@ def first_card(
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     """Return the given wait, or half of the longest period in the deck; raise ArgumentError without either."""
+    of_deck = wait_of_deck(inventory)
     if given is not None:
-        check_wait(given, wait_of_deck(inventory), path)
+        check_wait(given, of_deck, path)
         return Wait(given, "given", "as given")
-    period = find_inner_period(inventory)
-    if period is None:
+    if of_deck is None:
         raise ArgumentError(
             f"`wait` cannot be derived from {path} (no masses on linear springs found); give the force-free time that"
             " marks a flight: more than half of the longest natural period of the parts"
         )
-    half = float(f"{period.time / 2:.3g}")
-    return Wait(
-        half, "deck", f"half of the period {period.time:.3g} of {period.reason}"
-    )
+    return of_deck._replace(time=float(f"{of_deck.time:.3g}"))
 
 
 # Radioss.
@@ -171,11 +164,13 @@ def _make_radioss_card(
         raise DeckError(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
         )
-    _refuse_loads(run.starter)
+    for load in run.starter.named(*_LOADS):
+        raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
     contacts = list_forces(run.starter)
     if not contacts:
         raise DeckError(f"{path}: {NO_CONTACT}")
-    at_rest = after is None and _falls_from_rest(run, inventory, parts)
+    starts_moving = run.starter.named("INIVEL") or any(leg.starts for leg in run.legs)
+    at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
     first_switch = wait.time if after is None else max(after, wait.time)
     sensors = _write_sensors(contacts, wait.time, first_switch, bodies.sensor)
     largest_step = float(f"{wait.time / _STEPS_PER_WAIT:.2g}")
@@ -189,23 +184,6 @@ def _make_radioss_card(
     head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
     card = PrintedCard(head, (), files, starter=bodies.cards + sensors.text)
     return First(card, wait, notes)
-
-
-def _refuse_loads(starter: Starter) -> None:
-    """Raise DeckError if a load acts without a contact."""
-    for card in starter.named(*_LOADS):
-        raise DeckError(f"{card.at}: /{card.name} {_UNSEEN}")
-
-
-def _falls_from_rest(
-    run: RadiossRun, inventory: Inventory, parts: Collection[int]
-) -> bool:
-    """Return True if the parts are initially at rest and unsupported, and gravity acts on them."""
-    if run.starter is None or run.starter.named("INIVEL"):
-        return False
-    if any(leg.starts for leg in run.legs):
-        return False
-    return bool(inventory.boundary.gravity) and bool(parts)
 
 
 class _Sensors(NamedTuple):
@@ -296,22 +274,17 @@ def _make_ls_dyna_card(
         notes.append("TIME1 is 0: if you know the end of the load, give it (--after).")
     delay = wait.time / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
-    lines += write_header(
-        rigid_set,
-        write_number(after or 0.0),
+    lines += write_set_pair(
+        printing.swset,
+        (write_number(after or 0.0), "0.0"),
         write_number(delay),
-        (len(part_ids), 0),
-        Waiting(2, contact, delay, deformable_set, 1),
+        part_ids,
+        printing,
+        waits=(
+            Waiting(2, contact, delay, deformable_set, 1),
+            Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
+        ),
     )
-    lines += write_rigid_lines(part_ids, printing)
-    lines += write_header(
-        deformable_set,
-        "0.0",
-        "0.0",
-        (0, len(part_ids)),
-        Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
-    )
-    lines += write_deformable_lines(part_ids)
     text = "\n".join(lines) + "\n"
     return First(PrintedCard(text, (), {"switches.k": text}), wait, tuple(notes))
 
