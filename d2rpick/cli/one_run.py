@@ -471,6 +471,7 @@ def plan(
         )
     if judged_card:
         output.notes(judged_card.card.notes, ())
+        answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
     output.answer(answer, checked if form == "table" else "", every=every)
     return output.finish(objection=not (answer.supported and passed))
 
