@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.histories.history import History
-    from d2rpick.running.inner_motion import InnerMotion
     from d2rpick.running.witness import Quiet
 
     # Events of past flights, keyed by the start of the flight and the time at which it was seen.
@@ -43,7 +42,7 @@ class Event(NamedTuple):
 
 
 def find_events(
-    evidence: GrowingEvidence, motion: InnerMotion, decided: Decided | None = None
+    evidence: GrowingEvidence, decided: Decided | None = None
 ) -> tuple[Event, ...]:
     """Return all events in the order in which they were seen.
 
@@ -55,7 +54,7 @@ def find_events(
     RangeError
         If a given wait is too short.
     """
-    flights = evidence.flights(motion.wait)
+    flights = evidence.flights()
     rigid_times = evidence.rigid_times()
     history = evidence.history
     if decided is None:
@@ -63,7 +62,7 @@ def find_events(
     events: list[Event] = []
     for flight in flights:
         if flight.wait.source == "given":
-            longest = motion.longest(flight.seen)
+            longest = evidence.motion.longest(flight.seen)
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(history, flight, decided)
     events = [event for event in events if not _is_rigid(event.tr, rigid_times)]

@@ -15,6 +15,7 @@ from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches
+from d2rpick.running.inner_motion import InnerMotion
 from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
 from d2rpick.running.witness import GrowingWitness, Quiet
 
@@ -25,16 +26,25 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.running.witness import Needed
+    from d2rpick.running.inner_motion import Wait
 
 # Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
 
 class GrowingEvidence:
-    """Finds the time without force, and the flights, of the parts of a growing record."""
+    """Finds the time without force, and the flights, of the parts of a growing record.
 
-    def __init__(self) -> None:
+    ``given``, ``of_deck`` and ``before`` are those of its inner ``motion``.
+    """
+
+    def __init__(
+        self,
+        given: float | None = None,
+        of_deck: Wait | None = None,
+        before: float = 0.0,
+    ) -> None:
+        self.motion = InnerMotion(self, given, of_deck, before)
         self._record = GrowingRecord()
         self._witnesses: list[GrowingWitness] = []
         # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
@@ -73,6 +83,7 @@ class GrowingEvidence:
             motionless = np.zeros((balance.time.size, 3))
             columns = _make_columns(balance.time, motionless, balance)
             self._add((), None, columns, (None, balance))
+        self.motion.take(states)
 
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
@@ -137,13 +148,13 @@ class GrowingEvidence:
         self._has_moved = has_moved[-1:]
         return has_moved
 
-    def flights(self, needed: Needed) -> tuple[Quiet, ...]:
-        """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
+    def flights(self) -> tuple[Quiet, ...]:
+        """Return all flights that lasted for their wait, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         for witness in self.witnesses:
-            witness.examine(needed, self._find_gravity)
+            witness.examine(self.motion.wait, self._find_gravity)
         candidates = [
             (flight, float(witness.time[-1]))
             for witness in self.witnesses

@@ -16,7 +16,6 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.record import GrowingColumn, find_momenta
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.running.evidence import GrowingEvidence
 
 # A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
@@ -184,20 +184,22 @@ class _Longest(NamedTuple):
 class InnerMotion:
     """The wait at each state of a record, from the inner motion up to that state.
 
+    ``evidence`` shows which parts move, and since when no force has acted.
     ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
     """
 
     def __init__(
         self,
+        evidence: GrowingEvidence,
         given: float | None = None,
         of_deck: Wait | None = None,
         before: float = 0.0,
     ) -> None:
+        self._evidence = evidence
         self._given, self._least = given, of_deck
         self._half_of_springs = of_deck.time if of_deck else np.inf
         if before > (of_deck.time if of_deck else 0.0):
             self._least = Wait(before, "record", "as in the flight before")
-        self._evidence = GrowingEvidence()
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._part_motions: list[_Motion] = []
         # Motions that still continue, keyed by the indices of part and axis.
@@ -210,9 +212,8 @@ class InnerMotion:
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
-    def take(self, states: History, evidence: GrowingEvidence) -> None:
-        """Append states that the ``evidence`` already contains."""
-        self._evidence = evidence
+    def take(self, states: History) -> None:
+        """Append states that the evidence already contains."""
         momenta = find_momenta(states, of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses)

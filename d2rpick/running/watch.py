@@ -16,7 +16,7 @@ from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
 from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
+from d2rpick.running.inner_motion import wait_of_deck
 from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
@@ -68,8 +68,7 @@ class Watch:
 
     def _begin_again(self) -> None:
         """Forget all states of the run, but not the reported events."""
-        self._evidence = GrowingEvidence()
-        self._motion = InnerMotion(*self._waits)
+        self._evidence = GrowingEvidence(*self._waits)
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
@@ -122,7 +121,7 @@ class Watch:
                 time, message = None, f"no flight since {event.time:.6g}"
         if (
             time is None
-            and self._motion.longest(self._last_time) is None
+            and self._evidence.motion.longest(self._last_time) is None
             and self._waits[0] is None
         ):
             message += (
@@ -143,10 +142,9 @@ class Watch:
         if not follows:
             self._begin_again()
         self._evidence.take(states)
-        self._motion.take(states, self._evidence)
         time = self._evidence.history.time
         now, before = float(time[-1]), self._last_time
-        events = find_events(self._evidence, self._motion, self._decided)
+        events = find_events(self._evidence, self._decided)
         kept_count = len(self._events)
         if before is None:
             message = f"the run has reached {now:.6g}"
