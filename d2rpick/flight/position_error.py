@@ -174,7 +174,7 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
     mass = masses[members]
     if not has_clear_rotation(mass):
         return None
-    ways, path = _integrate_displacements(
+    ways, path = integrate_displacements(
         time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
     )
     stride = -(-time.size // _STATES)
@@ -206,7 +206,7 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
     return drift if doubt <= drift.limit else None
 
 
-def _integrate_displacements(
+def integrate_displacements(
     time: Samples, velocity: Samples, mass: Samples
 ) -> tuple[Samples, Samples]:
     """Return the displacements of parts (n, parts, 3) from their centre of mass, and its path (n,) [length]."""

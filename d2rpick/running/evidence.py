@@ -216,24 +216,20 @@ class GrowingEvidence:
                 return contacts[0] if contacts else None
         return None
 
-    def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
+    def find_rigid_times(self) -> list[tuple[float, float, float]]:
         """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
 
         The last of these periods may last to the end of the record.
         """
         momenta = find_momenta(self.history, of_parts=True)
         if momenta is None:
-            return ()
-        time = momenta.time
-        is_rigid = ~self._complete.rows.astype(np.bool_)
-        return tuple(
-            (
-                float(time[stretch.start]),
-                float(time[stretch.start + FEWEST - 1]),
-                float(time[min(stretch.stop, time.size - 1)]),
-            )
-            for stretch in find_stretches(is_rigid, FEWEST)
-        )
+            return []
+        rigid_times = []
+        for stretch in find_stretches(self._complete.rows == 0, FEWEST):
+            end = min(stretch.stop, momenta.time.size - 1)
+            states = [stretch.start, stretch.start + FEWEST - 1, end]
+            rigid_times.append(tuple(momenta.time[states].tolist()))
+        return rigid_times
 
 
 def highest_energy(history: History, start: float, end: float) -> float:
