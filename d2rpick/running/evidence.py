@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
-from d2rpick.histories.history import EXACT, Momenta, select_states
+from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches
 from d2rpick.running.inner_motion import InnerMotion
 from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, History, Samples
+    from d2rpick.histories.history import Balance, History, Momenta, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
 # Largest number of states before and in a flight from which gravity is determined.
@@ -74,60 +75,66 @@ class GrowingEvidence:
         of_parts = find_momenta(states, of_parts=True)
         self.moving = []
         if of_parts is not None and of_parts.time.size:
-            self._add_parts(of_parts, of_model)
+            self._add_parts(of_parts, of_model, balance)
         if of_model is not None:
-            self._add(of_model, (0,), np.ones(of_model.time.size, np.bool_), balance)
+            columns = _make_columns(of_model.time, of_model.of((0,)), balance)
+            self._add((0,), None, columns, (of_model, balance))
         elif balance is not None and balance.sliding is not None:
-            time = balance.time
-            motionless = Momenta(time, np.zeros((time.size, 1, 3)), None, EXACT, ())
-            self._add(motionless, (), np.ones(time.size, np.bool_), balance)
+            motionless = np.zeros((balance.time.size, 3))
+            columns = _make_columns(balance.time, motionless, balance)
+            self._add((), None, columns, (None, balance))
         self.motion.take(states)
 
-    def _add_parts(self, momenta: Momenta, of_model: Momenta | None) -> None:
+    def _add_parts(
+        self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
+    ) -> None:
         """Append part momenta to the evidence of all sets of parts that may fly together.
 
         The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
         when a rigid body has absorbed some parts.
         """
+        assert momenta.parts is not None
         are_complete = is_complete(momenta, of_model, self._largest_momentum)
         if of_model is not None:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
         self._complete.add(are_complete)
-        moves = self._find_moved(momenta) & are_complete[:, np.newaxis]
+        has_moved = self._find_moved(momenta)
+        moves = has_moved & are_complete[:, np.newaxis]
         changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
             numbers = tuple(np.flatnonzero(moves[begin]).tolist())
             self.moving.append((slice(begin, end), numbers))
         for members in dict.fromkeys(_list_sets(momenta)):
-            self._add(momenta, members, are_complete)
+            columns = _make_columns(momenta.time, momenta.of(members), balance)
+            # Contact energy shows collisions between bodies, which do not change the total momentum.
+            # Once other parts move, it shows their contacts too and is no longer used.
+            other_parts = sorted({*range(len(momenta.parts))} - {*members})
+            columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
+            parts = tuple(momenta.parts[number] for number in members)
+            self._add(members, parts, columns, (momenta, balance), are_complete)
 
     def _add(
         self,
-        momenta: Momenta,
         members: tuple[int, ...],
-        is_used: NDArray[np.bool_],
-        balance: Balance | None = None,
+        parts: tuple[Part, ...] | None,
+        columns: Samples,
+        written: tuple[Momenta | None, Balance | None],
+        is_used: NDArray[np.bool_] | None = None,
     ) -> None:
         """Append states to the evidence of a set of parts, which begins anew after states that are not used.
 
-        That of the model includes the contact energy in ``balance``, which shows collisions between bodies: these do
-        not change the total momentum.
+        ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
-        contact, precision = np.full(momenta.time.size, np.nan), EXACT
-        if balance is not None and balance.sliding is not None:
-            contact, precision = balance.sliding, balance.precision
-        columns = np.column_stack([momenta.time, contact, momenta.of(members)])
-        key = members if momenta.parts else None
-        for stretch in find_stretches(is_used):
+        key = None if parts is None else members
+        used = np.ones(len(columns), np.bool_) if is_used is None else is_used
+        precisions = [table.precision if table else EXACT for table in written]
+        for stretch in find_stretches(used):
             if stretch.start > 0 or key not in self._going_on:
-                parts = momenta.parts
-                if parts is not None:
-                    parts = tuple(parts[number] for number in members)
                 self._going_on[key] = GrowingWitness(members, parts)
                 self._witnesses.append(self._going_on[key])
-            self._going_on[key].add(columns[stretch], momenta.precision, precision)
-        if is_used.size and not is_used[-1]:
+            self._going_on[key].add(columns[stretch], *precisions)
+        if used.size and not used[-1]:
             self._going_on.pop(key, None)
 
     def _find_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
@@ -252,6 +259,18 @@ def _is_of_model(witness: GrowingWitness) -> bool:
 def _sample_states(first: int, last: int) -> Samples:
     """Return the states from ``first`` to ``last``, or some of them if there are too many."""
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
+
+
+def _make_columns(time: Samples, momentum: Samples, balance: Balance | None) -> Samples:
+    """Return time, contact energy and momentum as columns (k, 5). The energy is NaN if it is not written."""
+    contact = np.full(time.size, np.nan)
+    if (
+        balance is not None
+        and balance.sliding is not None
+        and balance.time.size == time.size
+    ):
+        contact = balance.sliding
+    return np.column_stack([time, contact, momentum])
 
 
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:

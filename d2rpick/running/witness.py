@@ -127,14 +127,17 @@ class GrowingWitness:
     ) -> None:
         """Append states, and find the force-free time at each.
 
-        ``columns`` (k, 5) are time, contact energy (NaN if it is not used), and momentum.
+        ``columns`` (k, 5) are time, contact energy (NaN where it is not used), and momentum.
         """
         self._columns.add(columns)
         contact, momentum = self._columns.rows[:, 1], self._columns.rows[:, 2:]
         self._laws = []
-        if not np.isnan(contact).any():
-            tolerance, self._shows_forces = _set_tolerance(contact, contact_precision)
-            self._laws.append((Constant(self.time, contact[:, np.newaxis]), tolerance))
+        is_used = ~np.isnan(contact)
+        if is_used.any():
+            energy = np.nan_to_num(contact)
+            tolerance, self._shows_forces = _set_tolerance(energy, contact_precision)
+            law = Constant(self.time, energy[:, np.newaxis])
+            self._laws.append((law, np.where(is_used, tolerance, np.inf)))
         if self.members:
             largest = np.abs(momentum).max(axis=1)
             tolerance, self._shows_forces = _set_tolerance(
