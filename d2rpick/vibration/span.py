@@ -83,6 +83,82 @@ class Span(NamedTuple):
     end: float
 
 
+def limit_bounds(
+    bounds: Span, td: float, after: float | None, landing: float | None
+) -> Span:
+    """Return bounds that begin at the end of the load and end at the landing, as far as they are given [time].
+
+    They always contain td.
+    """
+    if after is not None:
+        bounds = bounds._replace(start=min(after, td))
+    if landing is not None:
+        bounds = bounds._replace(end=max(min(bounds.end, landing), td))
+    return bounds
+
+
+def find_oscillator(
+    history: History,
+    td: float,
+    bounds: Span,
+    *,
+    oscillator: Mode | None = None,
+    fit_window: tuple[float, float] | None = None,
+    whole: bool = False,
+    quick: bool = False,
+) -> tuple[Span | None, Identification]:
+    """Return the window around ``td`` that an oscillator describes, and its fit: given, or else identified.
+
+    Parameters
+    ----------
+    history : History
+    td : float
+        [time]
+    bounds : Span
+        The part of the record to search [time].
+    oscillator, fit_window : optional
+        Given by the user: the oscillator itself, or the window to which it is fitted [time].
+    whole, quick : bool
+        As in `find_described_span`.
+
+    Returns
+    -------
+    span : Span or None
+        None when no oscillator describes the record around td or before.
+    fit : Identification
+        The accepted fit, with the share of a hidden mode, or the reason why none is accepted.
+    """
+    if fit_window:
+        fit = identify(*history.between(*fit_window))
+        span = find_span(history, td, fit, bounds) if fit.describes_record else None
+        return span, _add_hidden_share(history, fit)
+    if oscillator:
+        return find_described_span(history, td, bounds, oscillator, whole=whole)
+    longest_fit = find_longest_described(history, bounds, whole)
+    if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
+        span, fit = longest_fit
+    else:
+        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
+    return span, _add_hidden_share(history, fit)
+
+
+def _add_hidden_share(history: History, fit: Identification) -> Identification:
+    """Add to an accepted fit the share of the energy that a further mode, hidden in the residuals, may have."""
+    if not fit.describes_record or fit.mode is None:
+        return fit
+    return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
+
+
+@remember
+def _estimate_what_is_hidden(
+    history: History, start: float, end: float, _: float, *, fit: Identification
+) -> Identification:
+    """Return a fit with its hidden share; it is cached, so that situations can recognise that they share a fit."""
+    assert fit.mode is not None
+    share = estimate_hidden_share(*history.between(start, end), fit.mode)
+    return fit._replace(hidden_share=max(fit.hidden_share, share))
+
+
 def find_described_span(
     history: History,
     td: float,
@@ -118,9 +194,11 @@ def find_described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    up_to_td = Span(bounds.start, _mark(td, bounds))
+    mark_of_td = _mark(td, bounds)
+    up_to_td = Span(bounds.start, mark_of_td)
+    windows = _list_windows_around(td, bounds, whole=whole)
     refused = {}
-    for window in _list_windows_around(td, bounds, whole=whole):
+    for window in windows:
         quickly = quick or window != up_to_td
         span, fit = _grow_span(history, td, window, bounds, oscillator, quick=quickly)
         if span:
@@ -289,37 +367,32 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
 def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
     """Yield windows to try: around td, the longest first, then before td."""
     start, end = bounds
-    beginnings = [
-        start,
-        *(
-            _mark(td - share * (td - start), bounds)
-            for share in (() if whole else _BEGINNINGS)
-        ),
-    ]
-    ends = [
-        end,
-        _mark(td, bounds),
-        *(
-            _mark(td + share * (end - td), bounds, 1)
-            for share in (() if whole else _ENDS)
-        ),
-    ]
+    mark_of_td = _mark(td, bounds)
+    beginnings = [start]
+    ends = [end, mark_of_td]
+    early_ends = []
+    if not whole:
+        for share in _BEGINNINGS:
+            beginning = _mark(td - share * (td - start), bounds)
+            beginnings.append(beginning)
+        for share in _ENDS:
+            late_end = _mark(td + share * (end - td), bounds, 1)
+            ends.append(late_end)
+        for share in _EARLIER_ENDS:
+            early_end = _mark(td - share * (td - start), bounds)
+            early_ends.append(early_end)
     around = {
         Span(beginning, late)
         for beginning in beginnings
         for late in ends
         if beginning < late
     }
-    around.add(Span(start, _mark(td, bounds)))
+    around.add(Span(start, mark_of_td))
     yield from sorted(around, key=lambda window: window.start - window.end)
-    if not whole:
-        for share in _EARLIER_ENDS:
-            early = _mark(td - share * (td - start), bounds)
-            yield from (
-                Span(beginning, early)
-                for beginning in dict.fromkeys(beginnings)
-                if beginning < early
-            )
+    for early_end in early_ends:
+        for beginning in dict.fromkeys(beginnings):
+            if beginning < early_end:
+                yield Span(beginning, early_end)
 
 
 def _mark(time: float, bounds: Span, after: int = 0) -> float:
