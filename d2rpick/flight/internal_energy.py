@@ -161,15 +161,18 @@ def find_end_of_load(history: History, td: float) -> float | None:
     so that something still feeds the parts.
     """
     length = td - float(history.time[0])
-    earlier, latest = (
-        np.append(history.between(td - share * length, end)[1], history.energy_at(end))
-        for share, end in ((1 / 4, td - length / 16), (1 / 16, td))
-    )
+    start = td - length / 4
+    middle = td - length / 16
+    first, first_of_latest = np.searchsorted(history.time, [start, middle])
+    after_middle, after_td = np.searchsorted(history.time, [middle, td], side="right")
+    earlier = np.append(history.energy[first:after_middle], history.energy_at(middle))
+    latest = np.append(history.energy[first_of_latest:after_td], history.energy_at(td))
     if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
         return None
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
-    time, energy = history.between(-np.inf, td)
+    time = history.time[:after_td]
+    energy = history.energy[:after_td]
     above = energy > level
     falls = np.flatnonzero(above[:-1] & ~above[1:])
     if not falls.size:

@@ -194,9 +194,9 @@ def find_described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    mark_of_td = _mark(td, bounds)
+    mark_of_td = _mark(bounds, td)
     up_to_td = Span(bounds.start, mark_of_td)
-    windows = _list_windows_around(td, bounds, whole=whole)
+    windows = _list_windows_around(bounds, td, whole=whole)
     refused = {}
     for window in windows:
         quickly = quick or window != up_to_td
@@ -221,8 +221,8 @@ def find_longest_described(
     beginnings = [start]
     ends = [end]
     if not whole:
-        beginnings.append(_mark(middle - _BEGINNINGS[0] * (middle - start), bounds))
-        ends.append(_mark(middle + _ENDS[0] * (end - middle), bounds, 1))
+        beginnings.append(_mark(bounds, middle - _BEGINNINGS[0] * (middle - start)))
+        ends.append(_mark(bounds, middle + _ENDS[0] * (end - middle), 1))
     windows = [Span(*window) for window in product(beginnings, ends)]
     for window in sorted(windows, key=lambda one: one.start - one.end):
         span, fit = _grow_span(history, middle, window, bounds, None, quick=True)
@@ -364,22 +364,22 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
+def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Span]:
     """Yield windows to try: around td, the longest first, then before td."""
     start, end = bounds
-    mark_of_td = _mark(td, bounds)
+    mark_of_td = _mark(bounds, td)
     beginnings = [start]
     ends = [end, mark_of_td]
     early_ends = []
     if not whole:
         for share in _BEGINNINGS:
-            beginning = _mark(td - share * (td - start), bounds)
+            beginning = _mark(bounds, td - share * (td - start))
             beginnings.append(beginning)
         for share in _ENDS:
-            late_end = _mark(td + share * (end - td), bounds, 1)
+            late_end = _mark(bounds, td + share * (end - td), 1)
             ends.append(late_end)
         for share in _EARLIER_ENDS:
-            early_end = _mark(td - share * (td - start), bounds)
+            early_end = _mark(bounds, td - share * (td - start))
             early_ends.append(early_end)
     around = {
         Span(beginning, late)
@@ -395,16 +395,16 @@ def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Sp
                 yield Span(beginning, early_end)
 
 
-def _mark(time: float, bounds: Span, after: int = 0) -> float:
-    """Return the last mark at or before ``time``, or the first ``after`` it; without a mark, return the time."""
-    if bounds.end > bounds.start:
-        share = (time - bounds.start) / (bounds.end - bounds.start)
-    else:
-        share = 0.0
-    if not 0 < share <= 1:
-        return time
-    exponent = ceil(log(share) / log(_MARKS)) - after
-    return bounds.start + (bounds.end - bounds.start) * _MARKS ** max(exponent, 0)
+def _mark(bounds: Span, time: float, after: int = 0) -> float:
+    """Return the last mark at or before ``time``, or the first ``after`` it; the ends of the bounds are marks too."""
+    start, end = bounds
+    if time <= start:
+        return start
+    if time >= end:
+        return end
+    share = (time - start) / (end - start)
+    marks_behind = ceil(log(share) / log(_MARKS))
+    return start + (end - start) * _MARKS ** max(marks_behind - after, 0)
 
 
 def _grow_span(
