@@ -34,15 +34,15 @@ class Margin(NamedTuple):
     ``source`` is "given", "flight" (3 % of the flight), "landing" (how far a switch may move the landing), "grazing"
     (the same for a grazing contact) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None
     if the files do not show it.  ``grazing`` is the quantity that shows a grazing contact, "force" or "momentum", None
-    for any other contact.  ``for_any_rotation`` is True if the margin is larger because nothing shows how the body
-    turns.
+    for any other contact.  ``rotation`` is "any" if the margin allows for any rotation of the body, since nothing shows
+    how it turns, and "unseen" if such a rotation may make the contact earlier but its size is unknown; else None.
     """
 
     time: float
     source: str
     spread: float | None = None
     grazing: str | None = None
-    for_any_rotation: bool = False
+    rotation: str | None = None
 
 
 def compute_margin(
@@ -103,7 +103,7 @@ def estimate_landing_spread(
     neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    speed = compute_closing_speed(history, flight)
     if place is None or speed is None:
         return spread
     front = speed + (turning or 0.0)
@@ -122,7 +122,7 @@ def estimate_grazing_spread(
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
     """
     spread = estimate_spread_of_vibration(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    speed = compute_closing_speed(history, flight)
     if spread is None or speed is None or np.isinf(spread):
         amplitude = None
     else:
@@ -195,7 +195,7 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     """
     contact = _find_contact(history, flight)
     evidence = select_momenta_of_flight(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    speed = compute_closing_speed(history, flight)
     if contact is None or evidence is None or speed is None:
         return False
     acts = contact.force[contact.begin :] > _GRAZING_FORCE * contact.force.max()
@@ -345,7 +345,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
     return np.asarray(along / size) if size > 0 else None
 
 
-def _compute_closing_speed(history: History, flight: Flight) -> float | None:
+def compute_closing_speed(history: History, flight: Flight) -> float | None:
     """Return the speed along gravity at the end of a flight, or the total speed without gravity; else None."""
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:

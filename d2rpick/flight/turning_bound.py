@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.flight.body_frame import compute_inertia, compute_second_moments
-from d2rpick.flight.margin import select_momenta_of_flight
+from d2rpick.flight.margin import compute_closing_speed, select_momenta_of_flight
 from d2rpick.histories.samples import find_window
 
 if TYPE_CHECKING:
@@ -44,6 +44,21 @@ def bound_turning_speed(
         return None
     factor = _compute_largest_factor(placement, parts, mass[list(members)])
     return float(np.sqrt(2 * energy * factor))
+
+
+def may_turn_back(history: History, flight: Flight) -> bool:
+    """Return True if the energy of the rotation may move parts away from the ground as fast as the body approaches it.
+
+    Parts at the radius of gyration then have the speed of the centre of mass; those outside are faster.  False if the
+    files do not show it.
+    """
+    evidence = select_momenta_of_flight(history, flight)
+    energy = _bound_energy_of_rotation(history, flight)
+    closing = compute_closing_speed(history, flight)
+    if evidence is None or energy is None or closing is None:
+        return False
+    momenta, members = evidence
+    return bool(2 * energy >= momenta.mass(members) * closing**2)
 
 
 def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:

@@ -107,7 +107,7 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
         "no-contact",
         None,
         None,
-        False,
+        None,
     )
     bare = make_energy_history(history.energy, history.time)
     assert compute_margin(bare, flight) == (
@@ -115,7 +115,7 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
         "flight",
         None,
         None,
-        False,
+        None,
     )
 
 

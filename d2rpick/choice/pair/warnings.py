@@ -189,21 +189,18 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning, with the earliest contact time, if the margin allows for any rotation of the body."""
+    """Yield a warning if nothing shows how the body turns and its rotation may make the next contact earlier."""
     flight = situation.flight
-    if (
-        flight.end is None
-        or flight.refusal
-        or not situation.expected_margin.for_any_rotation
-    ):
+    margin = situation.expected_margin
+    if flight.end is None or flight.refusal or margin.rotation is None:
         return
     unknown = "nothing shows how the body turns, and its kinetic energy may be that of a rotation"
     slow = "which slows the surface that touches first"
-    moved = f"a position error at td makes the contact at {flight.end:.6g} come up to"
-    yield Caution(
-        "rotation-unknown",
-        f"{unknown} {slow}: {moved} {_describe_early_contact(situation)}",
-    )
+    moved = f"a position error at td makes the contact at {flight.end:.6g} come"
+    early = f"up to {_describe_early_contact(situation)}"
+    if margin.rotation == "unseen":
+        early = f"earlier than the margin of {margin.time:.2g}; give the deck (`deck`), which shows the rotation"
+    yield Caution("rotation-unknown", f"{unknown} {slow}: {moved} {early}")
 
 
 def _describe_early_contact(situation: Situation) -> str:

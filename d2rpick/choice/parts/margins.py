@@ -64,12 +64,23 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
     position_error = bodies.find_largest_error(times, direction)
     turning = compute_turning_speed(history, flight, bodies, settings.placement)
     margin = compute_margin(history, flight, place=position_error, turning=turning)
-    if turning is None or direction is None:
+    is_known = direction is None or bodies.compute_speed_at_front(direction) is not None
+    if is_known or margin.source == "no-contact":
         return margin
-    if bodies.compute_speed_at_front(direction) is None:
-        without = compute_margin(history, flight, place=position_error)
-        return margin._replace(for_any_rotation=margin.time > without.time)
-    return margin
+    return margin._replace(
+        rotation=_judge_rotation(history, flight, margin, position_error)
+    )
+
+
+def _judge_rotation(
+    history: History, flight: Flight, margin: Margin, position_error: float | None
+) -> str | None:
+    """Return how an unknown rotation of the bodies affects a ``margin``, see `Margin`."""
+    from d2rpick.flight.turning_bound import may_turn_back
+
+    if margin.time > compute_margin(history, flight, place=position_error).time:
+        return "any"
+    return "unseen" if position_error and may_turn_back(history, flight) else None
 
 
 def compute_turning_speed(
