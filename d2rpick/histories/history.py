@@ -162,6 +162,14 @@ class Track(NamedTuple):
     values: Samples
 
 
+class NodeMotion(NamedTuple):
+    """Displacements of the nodes ``ids`` since the start of the run: (n, nodes, 3) over ``time`` (n,) [length]."""
+
+    time: Samples
+    ids: tuple[int, ...]
+    displacements: Samples
+
+
 @remember
 def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
     """Return the sum of the momenta of some parts, read-only, shape (n, 3)."""
@@ -229,17 +237,22 @@ class Given:
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
     known momenta, in the order of the parts, NaN if unknown; None if no mass is known. ``forces`` are those of contacts
-    and rigid walls.
+    and rigid walls. ``written`` is all data of a switched run, whose parts are unknown while they were rigid.
     """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
     forces: tuple[ContactForce, ...] = ()
+    written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002
         """Return internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if not written."""
         return None
+
+    def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
+        """Return the displacements of those of some nodes that are written; None without any."""
+        return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if not written."""
