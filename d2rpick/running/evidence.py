@@ -16,7 +16,12 @@ from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches
 from d2rpick.running.inner_motion import InnerMotion
-from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
+from d2rpick.running.record import (
+    GrowingColumn,
+    GrowingRecord,
+    RunningMaximum,
+    find_momenta,
+)
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
@@ -50,7 +55,7 @@ class GrowingEvidence:
         # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
         self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        self._has_moved: NDArray[np.bool_] = np.zeros((1, 1), np.bool_)
+        self._has_moved = RunningMaximum()
         # For each state, True if the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
         self._largest_momentum = 0.0
@@ -99,7 +104,10 @@ class GrowingEvidence:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
         self._complete.add(are_complete)
-        has_moved = self._find_moved(momenta)
+        if self._first_momenta is None:
+            self._first_momenta = momenta.values[:1]
+        changed = (momenta.values != self._first_momenta).any(axis=2)
+        has_moved = self._has_moved.add(changed)
         moves = has_moved & are_complete[:, np.newaxis]
         changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
@@ -136,17 +144,6 @@ class GrowingEvidence:
             self._going_on[key].add(columns[stretch], *precisions)
         if used.size and not used[-1]:
             self._going_on.pop(key, None)
-
-    def _find_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Return which parts have changed their momentum by each of these states, shape (k, parts)."""
-        if self._first_momenta is None:
-            self._first_momenta = momenta.values[:1]
-            self._has_moved = np.zeros((1, momenta.values.shape[1]), np.bool_)
-        changed = (momenta.values != self._first_momenta).any(axis=2)
-        changes = np.concatenate([self._has_moved, changed])
-        has_moved = np.logical_or.accumulate(changes, axis=0)[1:]
-        self._has_moved = has_moved[-1:]
-        return has_moved
 
     def flights(self) -> tuple[Quiet, ...]:
         """Return all flights that lasted for their wait, in ascending order.

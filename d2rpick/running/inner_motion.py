@@ -16,7 +16,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.record import GrowingColumn, find_momenta
+from d2rpick.running.record import GrowingColumn, RunningMaximum, find_momenta
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,7 +87,7 @@ class _Motion:
         # The first half period is empty: it ends when the motion is first seen.
         self._swings: list[_HalfPeriod] = []
         self._columns = GrowingColumn()  # time, value, and least change that is a swing
-        self._lowest, self._highest = np.inf, -np.inf
+        self._highest, self._lowest = RunningMaximum(), RunningMaximum()
         # States at the last turning point and at the extreme value since then, and 1 if values rise, -1 if they fall.
         self._turn, self._extreme, self._sign = 0, 0, 1
 
@@ -100,15 +100,13 @@ class _Motion:
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
         """Append states (k,) and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
-        lows = np.minimum(np.minimum.accumulate(values), self._lowest)
-        highs = np.maximum(np.maximum.accumulate(values), self._highest)
-        self._lowest, self._highest = float(lows[-1]), float(highs[-1])
-        limits = np.maximum(_SWING * (highs - lows), least_swing)
+        ranges = self._highest.add(values) + self._lowest.add(-values)
+        limits = np.maximum(_SWING * ranges, least_swing)
         first = self._columns.size
         self._columns.add(np.column_stack([time, values, limits]))
         rows = self._columns.rows
         if not self._swings:
-            moved = np.flatnonzero(highs - lows > limits)
+            moved = np.flatnonzero(ranges > limits)
             if not moved.size:
                 return
             first += int(moved[0])
@@ -205,7 +203,7 @@ class InnerMotion:
         # Motions that still continue, keyed by the indices of part and axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
         self._heavy: tuple[int, ...] = ()
-        self._largest_speed = self._largest_energy = 0.0
+        self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which on the motions of parts count, no longer that of the energy [time].
         self._parts_since = np.inf
         # Longest half periods in the order in which they became known.
@@ -219,13 +217,9 @@ class InnerMotion:
             swings = self._follow_parts(momenta, momenta.masses)
             for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):
                 self._learn(swing, motion, self._longest_of_parts)
-        if states.time.size:
-            largest = np.maximum.accumulate(np.abs(states.energy))
-            largest = np.maximum(largest, self._largest_energy)
-            self._largest_energy = float(largest[-1])
-            least_swing = _AT_REST * largest
-            for swing in self._energy.add(states.time, states.energy, least_swing):
-                self._learn(swing, self._energy, self._longest_of_energy)
+        least_swing = _AT_REST * self._largest_energy.add(np.abs(states.energy))
+        for swing in self._energy.add(states.time, states.energy, least_swing):
+            self._learn(swing, self._energy, self._longest_of_energy)
 
     def _follow_parts(
         self, momenta: Momenta, masses: Samples
@@ -247,9 +241,7 @@ class InnerMotion:
             time = momenta.time[states]
             self._parts_since = min(self._parts_since, float(time[0]))
             velocity = momenta.values[states][:, members].sum(axis=1) / whole
-            speeds = np.maximum.accumulate(np.abs(velocity).max(axis=1))
-            speeds = np.maximum(speeds, self._largest_speed)
-            self._largest_speed = float(speeds[-1])
+            speeds = self._largest_speed.add(np.abs(velocity).max(axis=1))
             for number in heavy:
                 relative = momenta.values[states, number] - masses[number] * velocity
                 least_swing = masses[number] * _AT_REST * speeds
