@@ -72,7 +72,7 @@ def find_events(
             for event in events
             if event.tr is None or not start <= event.tr <= end
         ]
-    if history.time.size and not (flights and flights[0].start <= history.time[0]):
+    if not flights or flights[0].start > history.time[0]:
         push = evidence.find_contact(fewest=1)
         if push is not None:
             events.append(Event("load", push, push, "a force acts"))
