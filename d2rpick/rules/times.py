@@ -469,7 +469,8 @@ def _check_sign(case: Case) -> Iterator[Objection]:
 )
 def _check_kinetic_share(case: Case) -> Iterator[Objection]:
     """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
-    Near a maximum of the internal energy hardly any vibration energy is kinetic. Not reported if D2R209 is.
+    Near a maximum of the internal energy hardly any vibration energy is kinetic. If D2R209 reports the pair, this rule
+    does not.
 
     Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """
