@@ -39,6 +39,7 @@ from d2rpick.vibration.span import (
     find_described_span,
     find_longest_described,
     find_span,
+    measure_deviations,
 )
 
 if TYPE_CHECKING:
@@ -443,7 +444,7 @@ def _find_oscillator(
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return _add_hidden_share(history, fit), span
+        return _add_what_is_hidden(history, fit, span), span
     if settings.oscillator:
         span, fit = find_described_span(
             history, td, bounds, settings.oscillator, whole=whole
@@ -454,7 +455,7 @@ def _find_oscillator(
         span, fit = longest_fit
     else:
         span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
-    return _add_hidden_share(history, fit), span
+    return _add_what_is_hidden(history, fit, span), span
 
 
 def _find_window_of_modes(
@@ -480,21 +481,29 @@ def _find_window_of_modes(
     return Described(*described.span, described.vibration.vibration_energy)
 
 
-def _add_hidden_share(history: History, fit: Identification) -> Identification:
-    """Add to an accepted fit the share of the energy that a further mode, hidden in the residuals, may have."""
+def _add_what_is_hidden(
+    history: History, fit: Identification, span: Span | None
+) -> Identification:
+    """Add to an accepted fit what a further mode, hidden in the residuals of the fit or of the ``span``, may have."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
+    described = span or Span(fit.start, fit.end)
+    return _estimate_what_is_hidden(history, described, fit.rms, fit=fit)
 
 
 @remember
 def _estimate_what_is_hidden(
-    history: History, start: float, end: float, _: float, *, fit: Identification
+    history: History, described: Span, _: float, *, fit: Identification
 ) -> Identification:
-    """Return a fit with its hidden share; it is cached, so that situations can recognise that they share a fit."""
+    """Return a fit with what is hidden; it is cached, so that situations can recognise that they share a fit."""
     assert fit.mode is not None
-    share = estimate_hidden_share(*history.between(start, end), fit.mode)
-    return fit._replace(hidden_share=max(fit.hidden_share, share))
+    share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
+    times, deviations = measure_deviations(*history.between(*described), fit)
+    return fit._replace(
+        hidden_share=max(fit.hidden_share, share),
+        deviation_times=times,
+        deviations=deviations,
+    )
 
 
 def _skip_first_quarter(
