@@ -220,8 +220,9 @@ class AcceptableWindow(NamedTuple):
 class PairSuggestion(AnswerAtTd):
     """The answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
-    ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
-    in it, if much rigid time was given up for quality.
+    ``td_window`` is the window in which td was chosen, None for a given td; ``compared_td`` is the part of it in which
+    all td were compared, since they keep the margin.  ``longer`` is the longest acceptable pair in the window, if much
+    rigid time was given up for quality.
     """
 
     situation: Situation
@@ -230,6 +231,7 @@ class PairSuggestion(AnswerAtTd):
     cautions: tuple[Caution, ...]
     health: Health | None = None
     td_window: tuple[float, float] | None = None
+    compared_td: tuple[float, float] | None = None
     longer: Pair | None = None
 
     @property
@@ -296,7 +298,7 @@ class PairSuggestion(AnswerAtTd):
             self.situation,
             best,
             better=self._good_pair,
-            best_of=None if self.clearly_better else self.td_window,
+            best_of=None if self.clearly_better else self.compared_td,
         )
 
     @property
@@ -510,7 +512,10 @@ def suggest_in_run(
         chosen = choose_td(reference.history, td, settings, since, times)
         answer = suggest_at(chosen.situation)
         answer = replace(
-            answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
+            answer,
+            td_window=chosen.window,
+            compared_td=chosen.inside,
+            longer=chosen.given_up(answer.recommended),
         )
     else:
         answer = suggest_at(
