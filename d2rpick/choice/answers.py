@@ -27,7 +27,7 @@ from d2rpick.choice.pair.decision import (
     Decision,
     decide,
 )
-from d2rpick.choice.pair.grades import POOR
+from d2rpick.choice.pair.grades import GOOD, POOR
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     ROUNDING,
@@ -348,6 +348,14 @@ class PairSuggestion(AnswerAtTd):
             for td in (better.td, recommended.td)
         ]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
+
+
+def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
+    """Return the verdict on the recommended pair; if it is not good, with the better pair, which needs a search."""
+    decision = answer.decision
+    if decision is None or decision.reaches(GOOD) or answer.better_pair:
+        return decision
+    return suggest_at(answer.situation, ranked=answer.candidates).decision
 
 
 def suggest_in_history(

@@ -363,6 +363,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Some runs end within a state, or earlier than the other runs. Their tr is based on less data.",
             "Check whether these runs failed. Let them finish, or leave them out.",
         ),
+        "repeated-runs": Explanation(
+            "Several runs of the study have the same content, so that they agree by necessity. The common tr rests on "
+            "fewer runs than the table has rows.",
+            "Give each run once. Check whether a file was copied to the wrong folder.",
+        ),
         "internal-error": Explanation(
             "An error in d2rpick occurred for this input. d2rpick judged the other inputs.",
             "Please report the error with the output of --debug.",

@@ -386,7 +386,8 @@ class _SetComparison:
         settings = replace(self.settings, bodies=bodies, placement=self.placement)
         if isinstance(times, tuple):
             verdict = verify_run(reference, *times, settings)
-            situation, decision = verdict.situation, verdict.decision
+            situation = verdict.situation
+            decision: Decision | None = verdict.decision
             tr, td = times
         else:
             answer = suggest_in_run(reference, times, settings, with_better=False)
