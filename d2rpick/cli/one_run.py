@@ -33,6 +33,7 @@ from d2rpick.cli.options import (
 from d2rpick.cli.output import (
     IN_WORDS,
     Output,
+    VerdictOnPair,
     check_switched,
     open_with_output,
     replace_arguments_for_people,
@@ -42,6 +43,7 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
+    from d2rpick.api.asked import RunQuestion
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -175,11 +177,24 @@ def suggest(
             ]
         output.card(judged_card, new_cautions)
         decision = judged_card.worst if judged_card else None
-        return output.finish_by_verdict(decision, question.settings.min_quality)
-    output.answer(answer)
-    # a given td gets an answer even if it is poor; only a card must not be used without a check
+    else:
+        output.answer(answer)
+        decision = answer.decision
+    # A given td gets an answer even if it is poor; the answer and the card say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
-    return output.finish_by_verdict(answer.decision, min_quality)
+    _finish_answer(output, question, decision, min_quality)
+
+
+def _finish_answer(
+    output: Output,
+    question: RunQuestion,
+    decision: VerdictOnPair | None,
+    min_quality: str,
+) -> None:
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a deck that was given was not used."""
+    if question.unused_deck:
+        output.finish_without_deck(question.unused_deck)
+    output.finish_by_verdict(decision, min_quality)
 
 
 @options.make_command
@@ -245,7 +260,7 @@ def explore(
     output.answer(answer)
     chosen = answer.recommended
     decision = chosen.decision if chosen else None
-    output.finish_by_verdict(decision, question.settings.min_quality)
+    _finish_answer(output, question, decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -306,7 +321,7 @@ def verify(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish_by_verdict(answer.decision, question.settings.min_quality)
+    _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -463,16 +478,15 @@ def plan(
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        return output.finish(
-            objection=not (
-                output.card(judged_card, _select_new_cautions(judged_card, answer))
-                and passed
-            )
-        )
-    if judged_card:
-        output.notes(judged_card.card.notes, ())
-    output.answer(answer, checked if form == "table" else "", every=every)
-    return output.finish(objection=not (answer.supported and passed))
+        passed &= output.card(judged_card, _select_new_cautions(judged_card, answer))
+    else:
+        if judged_card:
+            output.notes(judged_card.card.notes, ())
+        output.answer(answer, checked if form == "table" else "", every=every)
+        passed &= bool(answer.supported)
+    if question.unused_deck:
+        output.finish_without_deck(question.unused_deck)
+    output.finish(objection=not passed)
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:

@@ -249,9 +249,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
-            "Most parts of the deck have other titles than the parts of the history, so d2rpick does not use the "
-            "deck.",
-            "Give the deck of this run.",
+            "Most parts of the deck have other titles than the parts of the history, or the deck lacks parts of the "
+            "history, so d2rpick does not use it. The exit code is 1 if you gave the deck with --deck.",
+            "Give the deck of this run, or leave out --deck.",
         ),
         "judged-by-whole": Explanation(
             "The history does not contain these parts, or the members of a part set or rigid body are unknown. "

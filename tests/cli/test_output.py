@@ -231,13 +231,27 @@ def test_warnings_go_to_stderr_and_quiet_silences_them_but_not_errors() -> None:
 
 
 def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
-    cut = put(tmp_path / "cut.glstat", Path(GLSTAT).read_bytes()[:-40])
+    cut = put(tmp_path / "cut.csv", Path(ENERGY).read_bytes()[:-40])
     document, result = run_json(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
     assert document["history"]["complete"] is False
     assert "truncated-input" in [warning["code"] for warning in document["warnings"]]
     assert [
         f"note: {note}" for note in document["history"]["notes"]
     ] == result.stderr.splitlines()[:1]
+
+
+def test_a_truncated_file_is_reported_once_with_the_end_of_its_record(
+    tmp_path: Path,
+) -> None:
+    cut = put(tmp_path / "cut.glstat", Path(GLSTAT).read_bytes()[:-40])
+    document, result = run_json(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
+    assert document["history"]["complete"] is False
+    (note,) = document["history"]["notes"]
+    assert "the file ends within" in note
+    (told,) = (line for line in result.stderr.splitlines() if "ends within" in line)
+    end = document["history"]["time_end"]
+    assert told.startswith("warning: truncated-input: the input ends within a state, ")
+    assert f"times after {end:.6g} are unknown; let the run finish, or copy" in told
 
 
 @pytest.mark.parametrize(
