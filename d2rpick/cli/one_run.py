@@ -38,7 +38,7 @@ from d2rpick.cli.output import (
     open_with_output,
     replace_arguments_for_people,
 )
-from d2rpick.cli.progress import show_reading
+from d2rpick.cli.progress import show_computing, show_reading
 from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, write
 
@@ -155,7 +155,8 @@ def suggest(
     output.check(cards)
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-    answer = suggest_for_question(question, wanted)
+    with show_computing(quiet=output.quiet):
+        answer = suggest_for_question(question, wanted)
     new_cautions = [
         caution
         for caution in answer.cautions
@@ -252,7 +253,8 @@ def explore(
     output.check(cards)
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-    answer = explore_for_question(question, td, td_window, steps)
+    with show_computing(quiet=output.quiet):
+        answer = explore_for_question(question, td, td_window, steps)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
@@ -315,7 +317,8 @@ def verify(
         with show_reading(switched, quiet=output.quiet):
             switched_run = open_requested_run(request, switched)
         output.spare(switched_run.sources)
-    answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
+    with show_computing(quiet=output.quiet):
+        answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
@@ -461,9 +464,9 @@ def plan(
         ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
         earlier = open_requested_run(request, before) if before else None
-    answer = plan_for_question(
-        question, min_rigid, options.read_windows_in(done) if done else (), earlier
-    )
+    done_windows = options.read_windows_in(done) if done else ()
+    with show_computing(quiet=output.quiet):
+        answer = plan_for_question(question, min_rigid, done_windows, earlier)
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), (), cards)

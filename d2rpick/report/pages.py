@@ -589,6 +589,7 @@ _LOOKS: Final[
     "plan": (
         lambda answer: [
             ("", plan.give_plan_sentence(answer)),
+            *plan.list_verdicts(answer),
             *plan.list_plan_remarks(answer),
         ],
         plan.build_flight_table,
@@ -599,7 +600,10 @@ _LOOKS: Final[
             answer, next(iter(parts.TABLES.values()))
         ),
     ),
-    "study": (study.list_outcome, study.build_run_table),
+    "study": (
+        lambda answer: [*study.list_outcome(answer), *study.list_run_reasons(answer)],
+        study.build_run_table,
+    ),
 }
 
 

@@ -455,7 +455,12 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
         in run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr
     )
     assert (
-        run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""
+        "-f ndjson writes what its name promises"
+        in run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr
+    )
+    pair = ("--tr", "0.0135867", "--td", "0.0687534")
+    assert (
+        run("verify", *pair, "-o", str(tmp_path / "judged.ndjson"), ENERGY).stderr == ""
     )  # it has no ndjson
     assert (
         run(
@@ -532,6 +537,14 @@ def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
     ).split("\r")[1]
     assert long.endswith("/binout0000 and 2 more ... 0 s")
     assert len(long) == 39
+
+
+def test_a_long_computation_is_shown_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with progress.show_computing(quiet=False, period=PERIOD):
+        time.sleep(5 * PERIOD)
+    assert stream.getvalue().split("\r")[1] == "computing ... 0 s"
 
 
 @pytest.mark.parametrize("case", ["no terminal", "quiet", "fast"])
