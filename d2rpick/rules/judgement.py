@@ -228,8 +228,8 @@ class HistoryJudge:
     ) -> Iterator[Fault]:
         reference = self._reference(parts)
         history = reference.history
-        first = float(history.time[0])
-        last = float(history.time[-1])
+        first = history.start
+        last = history.end
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
         outside = [
             (name == "td", name, time)
@@ -304,7 +304,7 @@ def _judge_open_window(
     """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
     tr.
     """
-    last = examine_td(history, float(history.time[-1]), settings)
+    last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
         return

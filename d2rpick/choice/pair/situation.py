@@ -84,7 +84,7 @@ def _find_faint_fluctuation(history: History, start: float) -> float:
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
     ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
     """
-    energies = history.between(start, float(history.time[-1]))[1]
+    energies = history.between(start, history.end)[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
     highest = _find_highest_energy(history)
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
@@ -358,8 +358,8 @@ def _find_other_models(
     history = situation.history
     td = situation.td
     flight = situation.flight
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     # Without evidence of the next contact, nothing is known about the time after td.
     is_described = situation.evidence.span is not None or flight.source == "oscillator"
     end = flight.end or (last if is_flying or is_described else td)
@@ -417,16 +417,14 @@ def _get_bounds(history: History, seen: Seen) -> Span:
     """Return the flight that the evidence shows, or else the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
-    return Span(float(history.time[0]), float(history.time[-1]))
+    return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
     """Return the window in which the energy shows no load, up to the end of the record if no contact is seen."""
     if quiet is None:
         return None
-    return Span(
-        quiet.start, float(history.time[-1]) if quiet.end is None else quiet.end
-    )
+    return Span(quiet.start, history.end if quiet.end is None else quiet.end)
 
 
 def _describe_by_modes(modes: ModalWindow | None) -> Described | None:
@@ -446,7 +444,7 @@ def _skip_first_quarter(
     """
     if span is None or fit is None or fit.mode is None:
         return None
-    quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
+    quarter = np.pi / 2 / fit.mode.omega if span.start > history.start else 0.0
     return Described(
         min(span.start + quarter, span.end),
         span.end,
