@@ -59,6 +59,8 @@ _MUCH_BETTER = 0.7
 # a share of the vibration energy, a number of standard errors, and a multiple of the systematic misfit.
 # The mean uses at least three samples; white noise exceeds the limit once in a million means.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
+# Means per period of the energy that show a mode which is hidden only in a part of the window.
+_MEANS_PER_ENERGY_PERIOD = 4
 # An oscillator that describes this share of the bounds is used for every td in its window; no other is searched for.
 _MOST_OF_BOUNDS = 0.5
 # Largest number of fits of the growing window; two are usual.
@@ -131,7 +133,7 @@ def find_oscillator(
     if fit_window:
         fit = identify(*history.between(*fit_window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return span, _add_hidden_share(history, fit)
+        return span, _add_what_is_hidden(history, fit, span)
     if oscillator:
         return find_described_span(history, td, bounds, oscillator, whole=whole)
     longest_fit = find_longest_described(history, bounds, whole)
@@ -139,24 +141,32 @@ def find_oscillator(
         span, fit = longest_fit
     else:
         span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
-    return span, _add_hidden_share(history, fit)
+    return span, _add_what_is_hidden(history, fit, span)
 
 
-def _add_hidden_share(history: History, fit: Identification) -> Identification:
-    """Add to an accepted fit the share of the energy that a further mode, hidden in the residuals, may have."""
+def _add_what_is_hidden(
+    history: History, fit: Identification, span: Span | None
+) -> Identification:
+    """Add to an accepted fit what a further mode, hidden in the residuals of the fit or of the ``span``, may have."""
     if not fit.describes_record or fit.mode is None:
         return fit
-    return _estimate_what_is_hidden(history, fit.start, fit.end, fit.rms, fit=fit)
+    described = span or Span(fit.start, fit.end)
+    return _estimate_what_is_hidden(history, described, fit.rms, fit=fit)
 
 
 @remember
 def _estimate_what_is_hidden(
-    history: History, start: float, end: float, _: float, *, fit: Identification
+    history: History, described: Span, _: float, *, fit: Identification
 ) -> Identification:
-    """Return a fit with its hidden share; it is cached, so that situations can recognise that they share a fit."""
+    """Return a fit with what is hidden; it is cached, so that situations can recognise that they share a fit."""
     assert fit.mode is not None
-    share = estimate_hidden_share(*history.between(start, end), fit.mode)
-    return fit._replace(hidden_share=max(fit.hidden_share, share))
+    share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
+    times, deviations = measure_deviations(*history.between(*described), fit)
+    return fit._replace(
+        hidden_share=max(fit.hidden_share, share),
+        deviation_times=times,
+        deviations=deviations,
+    )
 
 
 def find_described_span(
@@ -498,3 +508,45 @@ def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> floa
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # The energy of a mode oscillates about its mean by half of the vibration energy.
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
+
+
+def measure_deviations(
+    time: Samples, energy: Samples, fit: Identification
+) -> tuple[Samples, Samples]:
+    """Return times, and how far the energy is off the fit near each of them, beyond noise.
+
+    A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
+    deviation is the largest mean over a quarter of a period of the energy, within one such period.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+        The window that was fitted [time], [energy].
+    fit : Identification
+        Accepted.
+
+    Returns
+    -------
+    times, deviations : array of shape (d,)
+        [time], [energy], not negative.
+    """
+    assert fit.mode is not None
+    period = np.pi / fit.mode.omega
+    count = max(ceil((time[-1] - time[0]) / period * _MEANS_PER_ENERGY_PERIOD), 1)
+    edges = np.linspace(time[0], time[-1], count + 1)
+    cells = np.minimum(np.searchsorted(edges, time, side="right") - 1, count - 1)
+    states = np.bincount(cells, minlength=count)
+    sums = np.bincount(cells, energy - fit.mode.energy(time), minlength=count)
+    # A product of roots does not overflow, as a difference of squares would.
+    noise = np.sqrt(max(fit.rms - fit.structure, 0.0)) * np.sqrt(
+        fit.rms + fit.structure
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond_noise = np.abs(sums) / states - _ERRORS_OFF * noise / np.sqrt(states)
+    # A cell without states tells nothing.
+    deviations = np.nan_to_num(np.maximum(beyond_noise, 0.0), posinf=0.0)
+    padded = np.pad(deviations, _MEANS_PER_ENERGY_PERIOD)
+    around = np.lib.stride_tricks.sliding_window_view(
+        padded, 2 * _MEANS_PER_ENERGY_PERIOD + 1
+    )
+    return (edges[1:] + edges[:-1]) / 2, around.max(axis=1)
