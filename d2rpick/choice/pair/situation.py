@@ -276,11 +276,7 @@ def examine_td(
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
-    # If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
-    if seen.refusal and seen.flight:
-        fitted_at = (seen.flight.start + seen.flight.end) / 2
-    else:
-        fitted_at = td
+    fitted_at = _choose_time_of_fit(seen, td)
     is_shown = seen.flight is not None or seen.refusal is not None
     span: Span | None = None
     fit: Identification | None = None
@@ -326,9 +322,19 @@ def examine_td(
         return situation
     is_flying = seen.flight is not None and not seen.refusal
     models = _find_other_models(situation, is_flying=is_flying)
-    if models:
-        return replace(situation, evidence=evidence._replace(models=models))
-    return situation
+    if not models:
+        return situation
+    return replace(situation, evidence=evidence._replace(models=models))
+
+
+def _choose_time_of_fit(seen: Seen, td: float) -> float:
+    """Return the time around which an oscillator is searched for [time].
+
+    If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
+    """
+    if seen.refusal and seen.flight:
+        return (seen.flight.start + seen.flight.end) / 2
+    return td
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
