@@ -145,9 +145,7 @@ def _select_shown_candidates(
     shown_columns = [
         i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
     ]
-    return [head[i] for i in shown_columns], [
-        [row[i] for i in shown_columns] for row in rows
-    ]
+    return tables.select_columns(head, rows, shown_columns)
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:

@@ -68,8 +68,8 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     history = situation.history
     if start is None:
         return np.zeros(times.shape)
-    start = max(start, float(history.time[0]))
-    if situation.evidence.has_model or start >= history.time[-1]:
+    start = max(start, history.start)
+    if situation.evidence.has_model or start >= history.end:
         return np.maximum(times - start, 0.0)
     time, energy = history.between(np.nextafter(start, np.inf), np.inf)
     time = np.append(start, time)
@@ -165,7 +165,7 @@ def choose_td(
     elif chosen is not None:
         if times is None:
             times = list_offered_times(situation, inside, STEPS)[0].tolist()
-        earliest = float(history.time[0]) if since is None else since
+        earliest = history.start if since is None else since
         td = _find_unbeaten(
             td,
             times,
@@ -200,7 +200,7 @@ def list_offered_times(
         grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
     # A run that ends at td is useless.
-    return times[times < situation.history.time[-1]], set(peaks.tolist())
+    return times[times < situation.history.end], set(peaks.tolist())
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
