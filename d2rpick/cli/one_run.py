@@ -485,6 +485,7 @@ def plan(
     else:
         if judged_card:
             output.notes(judged_card.card.notes, ())
+            answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
         output.answer(answer, checked if form == "table" else "", every=every)
         passed &= bool(answer.supported)
     if question.unused_deck:
