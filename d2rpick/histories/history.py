@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -456,16 +456,28 @@ class History:
         return self.time[inside], self.energy[inside]
 
 
-def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
-    size = record.time.size
-    rows = {}
+def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a record with one row for each of its times, by name. Part masses have no such rows."""
+    columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)
-        is_initial = record_field.init and record_field.name != "masses"
-        if is_initial and isinstance(values, np.ndarray) and len(values) == size:
-            rows[record_field.name] = values[states]
-    return replace(record, **rows)  # type: ignore[arg-type]
+        is_given = record_field.init and record_field.name != "masses"
+        if (
+            is_given
+            and isinstance(values, np.ndarray)
+            and len(values) == record.time.size
+        ):
+            columns[record_field.name] = values
+    return columns
+
+
+def select_states(
+    record: Record, states: slice | NDArray[np.bool_ | np.intp]
+) -> Record:
+    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
+    columns = list_columns(record)
+    rows: dict[str, Any] = {name: values[states] for name, values in columns.items()}
+    return replace(record, **rows)
 
 
 def freeze(values: ArrayLike) -> Samples:

@@ -239,12 +239,6 @@ class TimeHistory(Database):
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
 
-    def size_until(self, time: float) -> int:
-        """Return the bytes of the header and of the states up to a time [time]."""
-        return self._records.at + self._stride * int(
-            np.searchsorted(self.time, time, side="right")
-        )
-
     @cached_property
     def part_time(self) -> Samples:
         """Times of all states, shape (n,) [time]."""
