@@ -300,6 +300,10 @@ class Solver:
         lines = lines[:_MOST_LINES] if errors else lines[-_MOST_LINES:]
         text = " | ".join(" ".join(line.split()) for line in lines)
         ended = f"ended by signal {self._signal}; " if self._signal else ""
+        free = shutil.disk_usage(self.folder).free
+        if free < self._measure_largest_restart():
+            # A solver that cannot write prints no error, only what it last wrote.
+            ended += f"the disk is full, {free / 1e6:.3g} MB are free; "
         return ended + (make_printable(text) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
@@ -310,15 +314,10 @@ class Solver:
 
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
-        sizes = [
-            path.stat().st_size
-            for path in self.folder.iterdir()
-            if path.suffix == ".rst"
-        ]
         histories = [self.history(leg) for leg in range(number)]
         written = sum(path.stat().st_size for path in histories if path.exists())
         to_come = round(written * share / max(1 - share, 0.1))
-        needed = 2 * max(sizes, default=0) + to_come
+        needed = 2 * self._measure_largest_restart() + to_come
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -329,6 +328,11 @@ class Solver:
     def _read_end(self, number: int, suffix: str, size: int = _TAIL_SIZE) -> str:
         """Return the last bytes of a file of a leg as text; "" if it is missing."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
+
+    def _measure_largest_restart(self) -> int:
+        """Return the size of the largest restart file of the run [bytes]; 0 without any."""
+        restarts = self.folder.glob("*.rst")
+        return max((path.stat().st_size for path in restarts), default=0)
 
     def _list_restarts(self, number: int) -> list[Path]:
         return list(self.folder.glob(f"{self.name}_{number:04d}_*.rst"))
