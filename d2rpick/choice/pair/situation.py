@@ -57,6 +57,8 @@ if TYPE_CHECKING:
 _SOLVER_ERROR: Final = 1e-5
 # A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
+# An oscillator that describes this share of the record is used; no modes are searched for that describe more of it.
+_MOST_OF_RECORD: Final = 0.5
 # Rounding error in units of the last digit: a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
@@ -290,9 +292,7 @@ def examine_td(
     else:
         fitted_at = td
     fit, span = _find_oscillator(history, fitted_at, settings, seen, quick=quick)
-    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
-        history, td, settings, seen
-    )
+    described = _find_longest_window(history, td, settings, seen, (fit, span))
     flight = _find_flight_at(history, td, settings, seen, described)
     is_given = settings.oscillator is not None
     is_prescribed = is_given or settings.fit_window is not None
@@ -457,10 +457,37 @@ def _find_oscillator(
     return _add_hidden_share(history, fit), span
 
 
-def _find_window_of_modes(
-    history: History, td: float, settings: Settings, evidence: Seen
+def _find_longest_window(
+    history: History,
+    td: float,
+    settings: Settings,
+    evidence: Seen,
+    oscillator: tuple[Identification | None, Span | None],
 ) -> Described | None:
-    """Return a window described by modes if only the energy can show a flight, otherwise None."""
+    """Return the window of an oscillator, or a longer one of modes if that is short; None without either.
+
+    Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
+    modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.
+    """
+    fit, span = oscillator
+    by_oscillator = _skip_first_quarter(history, fit, span)
+    is_given = settings.oscillator is not None or settings.fit_window is not None
+    record = float(history.time[-1] - history.time[0])
+    if by_oscillator is not None:
+        covered = by_oscillator.end - by_oscillator.start
+        if is_given or covered >= _MOST_OF_RECORD * record:
+            return by_oscillator
+    by_modes = _find_window_of_modes(
+        history, td, settings, evidence, exact=by_oscillator is not None
+    )
+    windows = [window for window in (by_oscillator, by_modes) if window is not None]
+    return max(windows, key=lambda window: window.end - window.start, default=None)
+
+
+def _find_window_of_modes(
+    history: History, td: float, settings: Settings, evidence: Seen, *, exact: bool
+) -> Described | None:
+    """Return a window described by modes, or ``exact`` ones, if only the energy can show a flight, otherwise None."""
     if evidence.flight or evidence.refusal or not settings.replay:
         return None
     # Imported here to keep start-up fast.
@@ -475,7 +502,7 @@ def _find_window_of_modes(
     else:
         guess = Span(quiet.start, last if quiet.end is None else quiet.end)
     described = find_described(history, td, guess)
-    if described is None:
+    if described is None or (exact and not described.vibration.is_exact):
         return None
     return Described(*described.span, described.vibration.vibration_energy)
 
