@@ -1,6 +1,7 @@
 """Structure of the package: the direction of its imports, and the modules that a command loads."""
 
 import ast
+import compileall
 import re
 import subprocess
 import sys
@@ -272,8 +273,18 @@ def test_no_file_is_mapped_into_memory() -> None:
 
 
 @cache
+def compile_package() -> None:
+    """Write the bytecode of the package.
+
+    Python loads `unicodedata` to compile a module with a named character.
+    """
+    assert compileall.compile_dir(ROOT / "d2rpick", quiet=1)
+
+
+@cache
 def list_loaded(*args: str) -> frozenset[str]:
     """Return the modules that a call of the program has loaded when it ends."""
+    compile_package()
     code = (
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
         "from d2rpick.__main__ import main; main()"

@@ -78,6 +78,8 @@ class Identification(NamedTuple):
         Root mean square of the vibration energy over the window [energy]; NaN without a mode.
     hidden_share : float
         Share of the vibration energy that a hidden further mode may have [-]; zero if none was searched for.
+    deviation_times, deviations : array of shape (d,)
+        How far the energy is off the fit at some times, beyond noise [time], [energy]; empty if it was not measured.
     follows : bool
         Whether the fit follows the samples, plausible or not.
     plausible : bool
@@ -95,6 +97,8 @@ class Identification(NamedTuple):
     covariance: Samples
     vibration: float = np.nan
     hidden_share: float = 0.0
+    deviation_times: Samples = np.zeros(0)
+    deviations: Samples = np.zeros(0)
     follows: bool = False
     plausible: bool = False
 

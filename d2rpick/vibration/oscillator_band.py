@@ -52,11 +52,17 @@ def residual_band(
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent
     opposed = _count_opposed(fit, tr, td)
+    decayed = _count_decayed(fit, tr, td)
+    # The misfit hides a mode that lasts or one that dies early: the worse of the two counts.
+    hidden = np.maximum(fit.hidden_share * opposed, decayed)
     stated_now, low, high = measures.band_about(
-        squared, off, fit.hidden_share * opposed, fit.hidden_share * squared
+        squared, off, hidden, fit.hidden_share * squared
     )
     # Beyond solver errors, a hidden mode is as likely as none, so half of what it may add is stated.
-    beyond_solver = max(fit.hidden_share - SMALLEST, 0.0) * opposed
+    solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
+    beyond_solver = np.maximum(
+        max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
+    )
     notable = np.maximum(beyond_solver - _HARMLESS, 0.0)
     return np.sqrt(np.square(stated_now) + notable / 2), low, high
 
@@ -65,6 +71,18 @@ def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
     """Return R^2 of a hidden damped mode that has opposite extremes at tr and td [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
+
+
+def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
+    """Return R^2 of a mode that the fit leaves out at tr, and that has decayed at td [-].
+
+    The deformation at tr holds its energy, which is compared with the vibration that is left at td.
+    """
+    assert fit.mode is not None
+    if fit.deviations.size == 0:
+        return np.zeros(tr.shape)
+    energy = np.interp(tr, fit.deviation_times, fit.deviations)
+    return np.asarray(energy / fit.mode.vibration_energy(td))
 
 
 def _compute_deviation(

@@ -18,6 +18,7 @@ from d2rpick.vibration.span import (
     find_described_span,
     find_span,
     fit_window,
+    measure_deviations,
 )
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
@@ -220,3 +221,64 @@ def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None
         for record in records
     ]
     assert np.percentile(deviations, 95) <= 0.05
+
+
+def make_decaying_modes(scale: float) -> list[Mode]:
+    """Return a mode that lasts, and one that has died after the first of its periods."""
+    return [
+        Mode(320.23, 40.92, 1.024 * scale, -0.495 * scale, 0.0),
+        Mode(1269.22, 382.38, -0.038 * scale, 0.130 * scale, 0.0),
+    ]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-100, 1e100])
+def test_what_a_fast_mode_leaves_before_it_dies_is_measured(scale: float) -> None:
+    slow, fast = make_decaying_modes(scale)
+    time = np.linspace(0.0, 0.14, 2400)
+    energy = sum_energies([slow, fast], time)
+    late = time > 0.03
+    fit = identify(time[late], energy[late])
+    times, deviations = measure_deviations(time, energy, fit)
+    period = np.pi / slow.omega
+    highest = np.array(
+        [fast.energy(time[np.abs(time - t) < period]).max() for t in times[:8]]
+    )
+    assert deviations[:8] == pytest.approx(highest, rel=0.6)
+    assert np.all(deviations[times > 0.05] < 1e-3 * fast.energy(0.0))
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+def test_noise_alone_does_not_deviate(noise: float) -> None:
+    for seed in range(5):
+        energy = add_noise(MAIN.energy(TIMES), noise, seed)
+        _, deviations = measure_deviations(TIMES, energy, identify(TIMES, energy))
+        assert not deviations.any()
+
+
+def test_cells_without_states_do_not_deviate() -> None:
+    time = np.concatenate([TIMES[TIMES < 2.0], TIMES[TIMES > 4.0]])
+    energy = MAIN.energy(time)
+    _, deviations = measure_deviations(time, energy, identify(time, energy))
+    assert deviations == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_band_holds_for_a_mode_that_dies_early() -> None:
+    """At tr it holds more energy than all that vibrates at td, although one oscillator describes the record."""
+    modes = make_decaying_modes(1.0)
+    time = np.linspace(0.0, 0.139, 2000)
+    energy = sum_energies(modes, time)
+    late = time > 0.01
+    fit = identify(time[late], energy[late])
+    times, deviations = measure_deviations(time, energy, fit)
+    judged = fit._replace(deviation_times=times, deviations=deviations)
+    mode = require(fit.mode)
+    tr, td = np.array([0.0033, 0.0424]), 0.1357
+    true = compute_replayed_residual(modes, tr, td)
+    stated = compute_replayed_residual(mode, tr, td)
+    assert true[0] > 0.5 > stated[0]
+    _, _, high_before = residual_band(fit, stated, tr, td)
+    assert high_before[0] < true[0]
+    stated_now, low, high = residual_band(judged, stated, tr, td)
+    assert np.all((low <= true + 1e-3) & (true <= high + 1e-3))
+    assert stated_now[0] == pytest.approx(true[0], abs=0.3)
+    assert stated_now[1] == pytest.approx(stated[1], abs=1e-9)
