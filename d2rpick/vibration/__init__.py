@@ -15,6 +15,11 @@ and `model.model_at` decides which one can be relied on at a td:
    whatever the law of the spring.
 4. energy: no sign is known; times at which the energy has the level of td remain (`moments`).
 
+The modal model describes nearly every record.  The others stay because each is better somewhere (figures:
+docs/explanation/basis.md): the oscillator states R of one mode ten times as accurately, and can be given; counted
+swings know the direction for springs that stiffen and for friction, where lines are refused or wide.  Energies of
+several parts are added, since only their sum is the energy of a whole structure.
+
 Lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy, or replace them where plastic
 flow or a damper's work hides these.
 

@@ -71,8 +71,8 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 def get_inner_window(history: History, guess: Span) -> Span:
     """Return the part of a guessed window made of complete 1/16 of the record, so that many td share few windows."""
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
     if guess.end >= last:
@@ -88,8 +88,8 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
             yield inner
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     for share in _BEGINNINGS:
         beginning = first + share * (last - first)
         if beginning < td:
