@@ -306,13 +306,7 @@ def examine_td(
             modes = find_described(history, td, guess)
             described = _describe_by_modes(modes)
     flight = choose_flight(
-        history,
-        td,
-        seen,
-        described,
-        quiet,
-        after=settings.after,
-        landing=settings.landing,
+        history, td, seen, described, quiet, settings.after, settings.landing
     )
     is_given = settings.oscillator is not None
     is_prescribed = is_given or settings.fit_window is not None
