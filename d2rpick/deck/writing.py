@@ -19,7 +19,7 @@ from d2rpick.deck.engine_files import (
 )
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_bodies import find_replaced_bodies
-from d2rpick.deck.radioss_columns import BEGIN, RIGID_BODY, UNITS
+from d2rpick.deck.radioss_columns import BEGIN, RIGID_BODY
 from d2rpick.deck.radioss_deck import (
     RadiossLeg,
     Starter,
@@ -33,7 +33,12 @@ from d2rpick.deck.radioss_deck import (
     split_keyword,
 )
 from d2rpick.deck.radioss_files import find_root, list_run_files
-from d2rpick.deck.radioss_run import RadiossRun, find_parts_off, read_run
+from d2rpick.deck.radioss_run import (
+    RadiossRun,
+    find_parts_off,
+    find_time_units,
+    read_run,
+)
 from d2rpick.deck.radioss_sensors import STOPS_SINCE
 from d2rpick.deck.reader import Deck, describe_cure, find_cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
@@ -51,7 +56,7 @@ _ONCE = {
 }
 
 _NOT_REPEATED: Final = {"RFILE"}  # a leg writes its restart file only at the end
-_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
+_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
 
 def write_deck(
@@ -555,8 +560,4 @@ def _read_interval(leg: RadiossLeg) -> float:
 
 def _find_second(run: RadiossRun) -> float | None:
     """Return the length of a second in the time unit of the deck [time]; None if the deck names no unit."""
-    assert run.starter
-    rows = next((card.rows for card in run.starter.named("BEGIN")), ())
-    if len(rows) > 3:
-        return _IN_A_SECOND.get(UNITS["Time"].cut(rows[3].text).strip().lower())
-    return None
+    return _IN_A_SECOND.get(find_time_units(run)[-1])

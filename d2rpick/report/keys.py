@@ -57,6 +57,7 @@ HISTORY: Final = row(
     Field("time_end", "number", get=lambda history: history.end),
     Field("complete", "flag", "false if the file ends within a state"),
     Field("notes", "texts"),
+    Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
     name="history",
 )  # fmt: skip
 _SOURCE: Final = one_of(

@@ -119,9 +119,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
                 *_select_shown_candidates(answer, display), display.width, _SPARE
             ),
         ]
+        lines += tables.format_in_line(list_candidate_reasons(answer, listed))
         hidden_count = len(answer.candidates) - display.limit
         lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
-        lines += tables.format_in_line(list_candidate_reasons(answer, listed))
     return "\n".join(lines)
 
 

@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 _SOLVER_ERROR: Final = 1e-5
 # A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
+# An oscillator that describes this share of the record is used; no modes are searched for that describe more of it.
+_MOST_OF_RECORD: Final = 0.5
 # Rounding error in units of the last digit: a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
@@ -295,8 +297,9 @@ def examine_td(
         )
     described = _skip_first_quarter(history, fit, span)
     quiet: QuietTime | None = None
-    if described is None and not is_shown:
-        # Only the energy can show a flight.
+    is_given = settings.oscillator is not None or settings.fit_window is not None
+    if not (is_shown or _covers_most(history, described) or (described and is_given)):
+        # Only the energy can show a flight, or more of it than an oscillator describes.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -304,13 +307,11 @@ def examine_td(
 
             guess = _get_quiet_window(history, quiet)
             modes = find_described(history, td, guess)
-            described = _describe_by_modes(modes)
+            described = _choose_longer_window(described, modes)
     flight = choose_flight(
         history, td, seen, described, quiet, settings.after, settings.landing
     )
-    is_given = settings.oscillator is not None
-    is_prescribed = is_given or settings.fit_window is not None
-    evidence = Evidence(fit, span, is_given, prescribed=is_prescribed)
+    evidence = Evidence(fit, span, settings.oscillator is not None, prescribed=is_given)
     situation = Situation(history, td, settings, flight, evidence)
     if not settings.replay:
         return situation
@@ -427,11 +428,29 @@ def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
     return Span(quiet.start, history.end if quiet.end is None else quiet.end)
 
 
-def _describe_by_modes(modes: ModalWindow | None) -> Described | None:
-    """Return the window that modes describe, with the energy of their vibration; None without modes."""
+def _covers_most(history: History, described: Described | None) -> bool:
+    """Return True if a window is so long that no modes are searched for that describe more of the record."""
+    if described is None:
+        return False
+    record = float(history.time[-1] - history.time[0])
+    return described.end - described.start >= _MOST_OF_RECORD * record
+
+
+def _choose_longer_window(
+    by_oscillator: Described | None, modes: ModalWindow | None
+) -> Described | None:
+    """Return the window of an oscillator, or a longer one that modes describe; None without either.
+
+    Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
+    modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.
+    """
     if modes is None:
-        return None
-    return Described(*modes.span, modes.vibration.vibration_energy)
+        return by_oscillator
+    by_modes = Described(*modes.span, modes.vibration.vibration_energy)
+    if by_oscillator is None:
+        return by_modes
+    is_longer = by_modes.end - by_modes.start > by_oscillator.end - by_oscillator.start
+    return by_modes if is_longer and modes.vibration.is_exact else by_oscillator
 
 
 def _skip_first_quarter(

@@ -120,6 +120,7 @@ class RunPlan:
     """The answer of ``plan``: all flights in time order, and warnings.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
+    ``fewest_cycles`` are those of the written run, if one largest time step holds throughout, as with sensors.
     """
 
     history: History
@@ -128,6 +129,7 @@ class RunPlan:
     flights: tuple[PlannedFlight, ...]
     cautions: tuple[Caution, ...]
     done: tuple[Times, ...] = ()
+    fewest_cycles: int | None = None
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
