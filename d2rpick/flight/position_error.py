@@ -2,8 +2,8 @@
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
-relative displacement from tr to td, in the frame that turns with the body ("Out of place" in docs).  Displacements come
-from the velocities of the parts, their momenta over their masses.
+relative displacement from tr to td, in the frame that turns with the body (docs/explanation/position-error.md).
+Displacements come from the velocities of the parts, their momenta over their masses.
 
 Each of several rigid bodies has its own error, and the largest counts.  A body of a single part moves as the part does:
 its momentum is kept, and nothing in it is frozen elsewhere.

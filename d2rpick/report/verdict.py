@@ -57,7 +57,7 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     *MEASURES.fields,
     *keys.QUALITY,
-    keys.MATCHES._replace(get=lambda answer: answer.candidate.parts),
+    keys.NO_PARTS,
     keys.HEALTH,
     Field("reasons", "texts"),
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
@@ -130,9 +130,11 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     """Return the known measures of the pair with their displayed names."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
+    unit = answer.situation.history.energy_unit
+    unit_text = f" [{make_printable(unit)}]" if unit else ""
     rows: list[tuple[str, tables.Cell]] = [
-        ("energy at tr", best.energy),
-        ("energy at td", answer.energy_td),
+        (f"energy at tr{unit_text}", best.energy),
+        (f"energy at td{unit_text}", answer.energy_td),
         ("energy at tr / at td", best.level_ratio),
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),
@@ -141,7 +143,6 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
         ("residual, expected", tables.format_if_known(best.residual, ".3f")),
         ("residual, lowest", tables.format_if_known(best.residual_low, ".3f")),
         ("residual, highest", tables.format_if_known(best.residual_high, ".3f")),
-        ("mismatch of the parts", tables.format_if_known(best.part_mismatch, ".3f")),
         ("timing tolerance", best.timing_tolerance),
         ("position error", best.position_error),
     ]

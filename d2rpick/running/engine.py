@@ -294,6 +294,10 @@ class Solver:
         lines = lines[:_MOST_LINES] if errors else lines[-_MOST_LINES:]
         text = " | ".join(" ".join(line.split()) for line in lines)
         ended = f"ended by signal {self._signal}; " if self._signal else ""
+        free = shutil.disk_usage(self.folder).free
+        if free < self._measure_largest_restart():
+            # A solver that cannot write prints no error, only what it last wrote.
+            ended += f"the disk is full, {free / 1e6:.3g} MB are free; "
         return ended + (make_printable(text) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
@@ -304,10 +308,9 @@ class Solver:
 
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
-        sizes = [status.st_size for status in self._list_status("_*.rst")]
         written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
         to_come = round(written * share / max(1 - share, 0.1))
-        needed = 2 * max(sizes, default=0) + to_come
+        needed = 2 * self._measure_largest_restart() + to_come
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -323,6 +326,11 @@ class Solver:
         """Return the restarts of a leg by their domains, the ends of their names."""
         paths = self.folder.glob(f"{self.name}_{number:04d}_*.rst")
         return {path.name[-8:]: path for path in paths}
+
+    def _measure_largest_restart(self) -> int:
+        """Return the size of the largest restart file of the run [bytes]; 0 without any."""
+        sizes = (status.st_size for status in self._list_status("_*.rst"))
+        return max(sizes, default=0)
 
     def _list_status(self, pattern: str) -> list[os.stat_result]:
         """Return the status of the files whose name is that of the run with a pattern."""
