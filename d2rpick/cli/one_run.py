@@ -234,9 +234,9 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    The td form a grid over --td-window or the longest flight, with every peak of the energy; each is judged as by
-    `suggest --td`.  The table lists the pairs that no other pair beats in both error and rigid time.  d2rpick also
-    names the nearest td with half the error.
+    It compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.  It
+    judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and rigid
+    time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -485,6 +485,7 @@ def plan(
     else:
         if judged_card:
             output.notes(judged_card.card.notes, ())
+            answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
         output.answer(answer, checked if form == "table" else "", every=every)
         passed &= bool(answer.supported)
     if question.unused_deck:

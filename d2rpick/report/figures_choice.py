@@ -281,7 +281,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     """Draw the energy over time on shaded flights, with the rigid windows below the curve."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
-    span = float(history.time[-1] - history.time[0])
+    span = history.duration
     axes.plot(
         history.time,
         history.energy,

@@ -187,6 +187,11 @@ DOCUMENT: Final = Document(
             "number?",
             "CPU time relative to the reference run, with all supported windows; null if the cost is unknown",
         ),
+        Field(
+            "fewest_cycles",
+            "integer?",
+            "fewest time steps of the written run, if one largest step holds throughout, as with sensors; else null",
+        ),
     ),
 )
 

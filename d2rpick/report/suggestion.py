@@ -38,9 +38,7 @@ _WINDOW: Final = row(
 # a candidate and the decision on it
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
-    keys.MATCHES._replace(
-        get=lambda candidate_and_decision: candidate_and_decision[0].parts
-    ),
+    keys.NO_PARTS,
     *keys.DECIDED.of_part(
         lambda candidate_and_decision: candidate_and_decision[1],
         ("verdict", "verdict_reason", "cure"),
@@ -145,9 +143,7 @@ def _select_shown_candidates(
     shown_columns = [
         i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
     ]
-    return [head[i] for i in shown_columns], [
-        [row[i] for i in shown_columns] for row in rows
-    ]
+    return tables.select_columns(head, rows, shown_columns)
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:

@@ -71,8 +71,8 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 def get_inner_window(history: History, guess: Span) -> Span:
     """Return the part of a guessed window made of complete 1/16 of the record, so that many td share few windows."""
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
     if guess.end >= last:
@@ -82,33 +82,14 @@ def get_inner_window(history: History, guess: Span) -> Span:
     return Span(float(start), float(end))
 
 
-def get_outer_window(history: History, guess: Span) -> Span:
-    """Return the whole parts of a record that contain a guessed window, so that guesses of many td share few windows.
-
-    Examples
-    --------
-    >>> from d2rpick.histories.history import History
-    >>> time = np.linspace(0.0, 16.0, 33)
-    >>> history = History(time, time, source=("made",), format="csv", channel="E")
-    >>> get_outer_window(history, Span(2.3, 7.9)), get_outer_window(history, Span(0.0, 15.1))
-    (Span(start=2.0, end=8.0), Span(start=0.0, end=16.0))
-    """
-    first = float(history.time[0])
-    last = float(history.time[-1])
-    part = (last - first) / _PARTS
-    start = first + part * np.floor((guess.start - first) / part)
-    end = first + part * np.ceil((guess.end - first) / part)
-    return Span(max(float(start), first), min(float(end), last))
-
-
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
     """Yield windows to try: the guessed one, then later ones up to the end of the record."""
     if guess is not None:
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
             yield inner
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     for share in _BEGINNINGS:
         beginning = first + share * (last - first)
         if beginning < td:

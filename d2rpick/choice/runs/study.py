@@ -223,7 +223,7 @@ def judge_run(question: Question, source: str) -> StudyRow:
     end = None
     try:
         reference = read_reference([source], question.selection, question.input_format)
-        end = float(reference.history.time[-1])
+        end = reference.history.end
         answer = suggest_in_run(
             reference, question.td, question.settings, with_better=False
         )

@@ -247,7 +247,7 @@ def explore_run(
     """
     history = reference.history
     refuse_unsound(history, settings, td)
-    record = float(history.time[0]), float(history.time[-1])
+    record = history.start, history.end
     window = td_window or find_longest_flight(
         history, settings, otherwise=None if td is None else record
     )
