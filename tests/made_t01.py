@@ -39,13 +39,13 @@ class T01Writer:
 
     def state(
         self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2,
-        groups: Sequence[Sequence[float]] = (),
+        groups: Sequence[Sequence[float]] = (), nodes: Sequence[float] = (0.0,) * 18,
     ) -> None:  # fmt: skip
         self.reals([time])
         self.reals(whole)
         self.reals(parts)
         self.reals([0.0] * subset_variables)
-        self.reals([0.0] * 18)
+        self.reals(nodes)
         for values in groups:
             self.reals(values)
 

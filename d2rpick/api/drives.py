@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards, parse_id_ranges
-from d2rpick.base.errors import ConfigurationError, D2RPickError
+from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError
 from d2rpick.choice.parts.cost import CostModel
 from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.deck import read_inventory
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.base.errors import Caution
     from d2rpick.running.sequence import Leg
 
 # shortest time between td and a contact [s]
@@ -118,8 +117,8 @@ class Driving:
         with alone(folder):
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
-            begun = journal.all("begun")
-            computed = journal.all("ended")
+            begun = journal.records[:1]
+            computed = journal.has("ended")
             if computed and not resume:
                 raise D2RPickError(
                     f"{folder}: this run has begun; continue it with --resume, or choose another folder"
@@ -157,7 +156,7 @@ class Driving:
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Return the result of the run so far."""
-        legs = driver.legs
+        legs = driver.journal.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
         reasons = [
@@ -165,14 +164,20 @@ class Driving:
             for leg in legs
             if leg.findings.why and not leg.findings.idle
         ]
+        flights = tuple(windows(legs, self.limits))
+        warnings = [
+            Caution("out-of-place", window.warning)
+            for window in flights
+            if window.warning
+        ]
         return Drive(
             run=open_run(names),
             deck=self.deck,
-            windows=tuple(windows(legs, self.limits)),
+            windows=flights,
             legs=tuple(legs),
             why=reasons[-1] if reasons else "",
             saved=(self._by_model(legs), _estimate_saving_by_time(legs, self.deck.end)),
-            cautions=(*self.cautions, *driver.out_of_place),
+            cautions=(*self.cautions, *warnings),
             command=tuple(command),
         )
 

@@ -138,7 +138,8 @@ def explore(
     wanted = times.check_time("td", td)
     window = times.check_window("td_window", td_window)
     count = arguments.check_whole_number("steps", _STEPS if steps is None else steps, 1)
-    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    request = make_request(run, parts, flying, deck, weights, choosing)
+    question = ask_run(run, request)
     return explore_for_question(question, wanted, window, count)
 
 
@@ -290,7 +291,8 @@ def plan(
     windows = times.check_windows("done", done)
     if before is not None:
         arguments.check_run("before", before)
-    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    request = make_request(run, parts, flying, deck, weights, choosing)
+    question = ask_run(run, request)
     return plan_for_question(question, shortest, windows, before)
 
 

@@ -223,9 +223,9 @@ def suggest(
         times.check_time("td", td),
         times.check_window("td_window", td_window),
     )
-    return suggest_for_question(
-        ask_run(run, make_request(run, parts, flying, deck, weights, choosing)), wanted
-    )
+    request = make_request(run, parts, flying, deck, weights, choosing)
+    question = ask_run(run, request)
+    return suggest_for_question(question, wanted)
 
 
 def suggest_for_question(
@@ -306,7 +306,8 @@ def verify(
     )
     if switched is not None:
         arguments.check_run("switched", switched)
-    question = ask_run(run, make_request(run, parts, flying, deck, weights, choosing))
+    request = make_request(run, parts, flying, deck, weights, choosing)
+    question = ask_run(run, request)
     return judge_pair(question, *pair, switched, min_ratio)
 
 

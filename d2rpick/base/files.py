@@ -219,6 +219,26 @@ def _state_of(name: str) -> FileState:
     return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
 
 
+def read_into(file: FileIO, room: memoryview, begin: int) -> int:
+    """Fill ``room`` with the bytes of a file from an offset on, and return their number, fewer if the file ends."""
+    done = 0
+    while done < len(room):
+        # One call may return fewer bytes than requested, and never more than 2 GB.
+        count = _read_once(file, room[done:], begin + done)
+        if not count:
+            break
+        done += count
+    return done
+
+
+def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
+    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
+    if hasattr(os, "preadv"):
+        return os.preadv(file.fileno(), [room], begin)
+    file.seek(begin)
+    return file.readinto(room)
+
+
 def read_at_rest(
     name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False
 ) -> FileState | bytes:

@@ -163,7 +163,8 @@ def verify_in_history(
     _check_order(tr, td)
     if earlier and td == earlier.td:
         return verify_at(earlier, tr)
-    return verify_at(examine_td(history, td, settings), tr)
+    situation = examine_td(history, td, settings)
+    return verify_at(situation, tr)
 
 
 def verify_at(situation: Situation, tr: float) -> PairVerdict:
@@ -351,7 +352,8 @@ def suggest_in_history(
     history: History, td: float, settings: Settings
 ) -> PairSuggestion:
     """Rank the candidates for tr at ``td`` and recommend one; raise RangeError if td lies outside the record."""
-    return suggest_at(examine_td(history, td, settings))
+    situation = examine_td(history, td, settings)
+    return suggest_at(situation)
 
 
 def suggest_at(
@@ -513,9 +515,8 @@ def suggest_in_run(
             answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
         )
     else:
-        answer = suggest_at(
-            examine_td(reference.history, td, settings), with_better=with_better
-        )
+        situation = examine_td(reference.history, td, settings)
+        answer = suggest_at(situation, with_better=with_better)
     return _add_health(answer, reference.run)
 
 
@@ -528,9 +529,8 @@ def verify_run(
 ) -> PairVerdict:
     """Judge one pair of a reference run, with the errors and the argument ``earlier`` of `verify_in_history`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
-    return _add_health(
-        verify_in_history(reference.history, tr, td, settings, earlier), reference.run
-    )
+    verdict = verify_in_history(reference.history, tr, td, settings, earlier)
+    return _add_health(verdict, reference.run)
 
 
 def compare_with(

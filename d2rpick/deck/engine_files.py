@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
 # the names of time history files have two digits for the number of the engine run
-_MOST_LEGS = 99
+MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):
@@ -51,9 +51,9 @@ def plan_legs(
             stops.append((tr, None))
         if td > 0:
             stops.append((td, rigid_cap))
-    if len(stops) >= _MOST_LEGS:
+    if len(stops) >= MOST_LEGS:
         raise DeckError(
-            f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected"
+            f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {MOST_LEGS} were expected"
         )
     numbered = enumerate([*stops, (end, None)], start=1)
     return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]

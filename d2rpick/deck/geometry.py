@@ -301,6 +301,18 @@ class Placement:
         }
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
+    def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
+        """Return the positions (3,) of the watched nodes of given parts by their numbers [length]."""
+        inventory = self._inventory
+        numbers = dict(
+            zip(inventory.watched.tolist(), inventory.watched_ids.tolist(), strict=True)
+        )
+        return {
+            numbers[node]: position
+            for part in parts
+            for node, position in self.parts[part].watched.items()
+        }
+
     def find_nodes(self, parts: Collection[int]) -> Reals:
         """Return the positions of all nodes of the elements of some parts, shape (n, 3) [length]."""
         numbers = [

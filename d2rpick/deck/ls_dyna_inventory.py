@@ -188,6 +188,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
     )
     notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
     joints = ls_dyna_loads.read_joints(deck)
+    watched = mesh.table.known(_read_watched_nodes(deck))
     return Inventory(
         "ls-dyna",
         _build_parts(deck, parts, mesh),
@@ -197,7 +198,8 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         parts.all_known and not notes,
         joints=place_nodes(joints.found, mesh.table),
         ties=joints.unknown,
-        watched=mesh.table.known(_read_watched_nodes(deck)),
+        watched=watched,
+        watched_ids=mesh.table.ids[watched],
         moved=_has_moved_nodes(deck),
         files=tuple(deck.sources),
         boundary=ls_dyna_loads.read_ls_dyna_boundary(

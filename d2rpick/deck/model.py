@@ -232,8 +232,8 @@ class Inventory:
         Connections of parts that share no nodes, and rigid bodies that exist to be switched.
     ties : tuple of str
         Connections between unknown parts.
-    watched : array
-        Places of the nodes whose motion the run writes.
+    watched, watched_ids : array
+        Places of the nodes whose motion the run writes, and their numbers in the deck, both of shape (k,).
     moved : bool
         True if the deck moves nodes away from their coordinates.
     files : tuple of SourceFile
@@ -260,6 +260,7 @@ class Inventory:
     switched: tuple[Joint, ...] = ()
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
+    watched_ids: Places = field(default_factory=lambda: np.empty(0, np.int64))
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
     history_groups: frozenset[int] = frozenset()

@@ -33,18 +33,12 @@ from d2rpick.deck.printed_card import (
     write_number,
 )
 from d2rpick.deck.radioss_columns import (
-    DELAY,
-    FORCE_SENSOR,
     RUN,
-    SENSOR_INPUTS,
-    STOP,
 )
 from d2rpick.deck.switch_sets import (
     Waiting,
     group_by_lead,
-    write_deformable_lines,
-    write_header,
-    write_rigid_lines,
+    write_set_pair,
 )
 
 if TYPE_CHECKING:
@@ -58,8 +52,6 @@ _FILE: Final = "switches.k"
 # CODE that waits for the end of a force, and CODE that waits for a force
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
-# values of NRBF and NCSF that delete and activate the constraints on the parts
-_DELETE, _ACTIVATE = 1, 2
 _LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
     "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
@@ -149,38 +141,8 @@ def _write_window(
     part_sets: PartSets,
 ) -> Iterator[str]:
     """Yield the lines of the two switch sets of one window."""
-    rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
-    deformable_lines = [*write_deformable_lines(ids, part_sets)]
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted, activated = _choose_constraint_flags(printing)
-    yield from (
-        *write_header(
-            sets[0],
-            texts[0],
-            write_number(cap),
-            (len(rigid_lines) - 1, 0),
-            constraints=deleted,
-        ),
-        *rigid_lines,
-    )
-    yield from (
-        *write_header(
-            sets[1],
-            texts[1],
-            "0.0",
-            (0, len(deformable_lines) - 1),
-            constraints=activated,
-        ),
-        *deformable_lines,
-    )
-
-
-def _choose_constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
-    """Return NRBF and NCSF of the set that makes parts rigid, and of the set that makes them deformable."""
-    is_deleted = (printing.delete_nodal_bodies, printing.delete_node_sets)
-    return [flag * _DELETE for flag in is_deleted], [
-        flag * _ACTIVATE for flag in is_deleted
-    ]
+    yield from write_set_pair(sets, texts, write_number(cap), ids, printing, part_sets)
 
 
 def _print_ls_dyna_contact(
@@ -206,8 +168,6 @@ def _print_ls_dyna_contact(
     timing = find_pair_timing(windows, pushes)
     first, second = printing.swset
     part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
-    rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
-    deformable_lines = [*write_deformable_lines(ids, part_sets)]
     cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
     waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
     returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
@@ -226,21 +186,14 @@ def _print_ls_dyna_contact(
     lines = [f"$ {line}" for line in comment_lines]
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
-    deleted, activated = _choose_constraint_flags(printing)
-    earliest = write_number(timing.earliest)
-    counts = (len(rigid_lines) - 1, 0)
-    lines += (
-        *write_header(first, earliest, write_number(cap), counts, waits, deleted),
-        *rigid_lines,
-        *write_header(
-            second,
-            "0.0",
-            "0.0",
-            (0, len(deformable_lines) - 1),
-            returns,
-            activated,
-        ),
-        *deformable_lines,
+    lines += write_set_pair(
+        printing.swset,
+        (write_number(timing.earliest), "0.0"),
+        write_number(cap),
+        ids,
+        printing,
+        part_sets,
+        (waits, returns),
     )
     text = "\n".join(lines) + "\n"
     return PrintedCard(text, timing.windows, {_FILE: text})
@@ -361,9 +314,6 @@ def _print_radioss_contact(
     windows, _, _ = _check_run(windows, printing)
     kind, number, pushes = _find_force(printing)
     timing = find_sensor_timing(windows, pushes)
-    delay = DELAY.write(Tdelay=write_number(timing.wait, 20))
-    force = FORCE_SENSOR.write(ID=number, Dir="NF", Fmin=-1.0)
-    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{delay}\n{force}\n"
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
         (timing.latest, math.inf)
     ]
@@ -371,7 +321,8 @@ def _print_radioss_contact(
         f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).",
         *_BY_FORCE,
     )
-    sensors = _write_sensors(spans, printing.sensor, [sensor])
+    force = (kind, number, timing.wait)
+    sensors = _write_sensors(spans, printing.sensor, force)
     return _print_sensors(timing.windows, printing, sensors, (*explanation, *remarks))
 
 
@@ -449,33 +400,26 @@ def _print_sensors(
 
 
 def _write_sensors(
-    spans: Sequence[Times], first: int, further: Sequence[str] = ()
+    spans: Sequence[Times], first: int, force: tuple[str, int, float] | None = None
 ) -> tuple[str, int]:
     """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines all of them.
 
-    It is active in each of ``spans`` and while one of ``further`` is active; these texts have a placeholder for their
-    id.
+    It is active in each of ``spans``, and while a ``force`` acts, given by the arguments of `write_force_sensor`.
     """
-    from d2rpick.deck.radioss_sensors import NEVER
+    from d2rpick.deck.sensor_cards import (
+        write_any_of,
+        write_force_sensor,
+        write_time_sensor,
+    )
 
-    clock = "/SENSOR/TIME/{}\ndeformable\n"
-    kinds = []
-    for start, stop in spans:
-        delay = DELAY.write(Tdelay=write_number(start, 20))
-        end = STOP.write(Tstop=write_number(min(stop, NEVER), 20))
-        kinds.append(f"{clock}{delay}\n{end}\n")
-    kinds += further
-    texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
-    last = first
-    for number, next_sensor in enumerate(
-        range(first + 1, first + len(kinds)), start=first + len(kinds)
-    ):
-        inputs = SENSOR_INPUTS.write(sens_ID1=last, sens_ID2=next_sensor)
-        texts.append(
-            f"/SENSOR/OR/{number}\ndeformable\n{DELAY.write(Tdelay=0)}\n{inputs}\n"
-        )
-        last = number
-    return "".join(texts), last
+    texts = [
+        write_time_sensor(number, "deformable", start, stop)
+        for number, (start, stop) in enumerate(spans, start=first)
+    ]
+    if force:
+        texts.append(write_force_sensor(first + len(spans), *force))
+    combined, last = write_any_of(range(first, first + len(texts)), "deformable")
+    return "".join([*texts, combined]), last
 
 
 def _check_run(

@@ -165,6 +165,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     # If there is no engine file, all bodies may be switched.
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}
     rigid = _find_always_rigid(windows) | find_parts_of_fixed_bodies(run)
+    watched = mesh.table.known(_find_watched_nodes(starter))
     return Inventory(
         "radioss",
         _collect_parts(starter, mesh, rigid),
@@ -175,7 +176,8 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
         joints=model.place_nodes(joints.found, mesh.table),
         switched=model.place_nodes(joints.switched, mesh.table),
         ties=joints.unknown,
-        watched=mesh.table.known(_find_watched_nodes(starter)),
+        watched=watched,
+        watched_ids=mesh.table.ids[watched],
         moved=starter.transformed,
         files=tuple(run.deck.sources),
         history_groups=frozenset(

@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import find_reachable
 from d2rpick.deck.radioss_columns import DELAY, FORCE_SENSOR, SENSOR_INPUTS, STOP
-from d2rpick.deck.radioss_deck import Starter, get_lines_below_title, read_reals
+from d2rpick.deck.radioss_deck import (
+    Starter,
+    get_lines_below_title,
+    get_number,
+    read_reals,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -183,12 +188,19 @@ def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
 
 def has_only_one_force(starter: Starter) -> bool:
     """Return True if a deck has only one contact or rigid wall. Its force can then be found from the momenta."""
+    return len(list_forces(starter)) == 1
+
+
+def list_forces(starter: Starter) -> list[tuple[str, int]]:
+    """Return sensor kind and id of each contact and rigid wall that exerts a force on a flying body."""
+    # The keyword is /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id.
     contacts = [
-        card
+        ("INTER", get_number(card, 2) or get_number(card, 3))
         for card in starter.named("INTER")
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE
     ]
-    return len(contacts) + len(starter.named("RWALL")) == 1
+    walls = [("RWALL", get_number(card, -1)) for card in starter.named("RWALL")]
+    return contacts + walls
 
 
 def join_spans(several: Sequence[Spans]) -> Spans:

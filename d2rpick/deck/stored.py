@@ -8,12 +8,11 @@ disappears.
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.base.files import FileState, read_at_rest
+from d2rpick.base.files import FileState, read_at_rest, read_into
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -98,14 +97,10 @@ class DeckOnDisk:
         return bytes(room)
 
     def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
-        done = 0
-        wanted = memoryview(room)[: end - begin]
-        while done < len(wanted):  # one call may return fewer bytes than requested
-            count = _read_at(file, wanted[done:], begin + done)
-            if not count:
-                raise self._changed()
-            done += count
-        return done
+        size = end - begin
+        if read_into(file, memoryview(room)[:size], begin) < size:
+            raise self._changed()
+        return size
 
     def _changed(self) -> DeckError:
         problem = f"{self._name}: the file was rewritten or replaced while it was read"
@@ -130,14 +125,6 @@ def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
         if state.size <= HELD_UP_TO
         else on_disk
     )
-
-
-def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
-    if hasattr(os, "preadv"):
-        return os.preadv(file.fileno(), [room], begin)
-    file.seek(begin)
-    return file.readinto(room)
 
 
 def _open_file(name: str) -> FileIO:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Printing
 
+# values of NRBF and NCSF that delete and activate the constraints on the parts
+_DELETE, _ACTIVATE = 1, 2
+
 
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
@@ -112,3 +115,28 @@ def write_header(
         R2D=counts[1],
         OFFSET=write_number(waiting.offset),
     )
+
+
+def write_set_pair(
+    sets: tuple[int, int],
+    times: tuple[str, str],
+    step_cap: str,
+    ids: Sequence[int],
+    printing: Printing,
+    part_sets: PartSets = NO_SETS,
+    waits: tuple[Waiting, Waiting] = (Waiting(), Waiting()),
+) -> Iterator[str]:
+    """Yield the lines of a switch set that makes parts rigid, and of one that makes them deformable again.
+
+    ``sets``, ``times`` and ``waits`` are those of the two sets.  ``step_cap`` holds while the parts are rigid.
+    """
+    rigid_lines = [*write_rigid_lines(ids, printing, part_sets)]
+    deformable_lines = [*write_deformable_lines(ids, part_sets)]
+    is_deleted = (printing.delete_nodal_bodies, printing.delete_node_sets)
+    deleted = [flag * _DELETE for flag in is_deleted]
+    activated = [flag * _ACTIVATE for flag in is_deleted]
+    counts = (len(rigid_lines) - 1, 0), (0, len(deformable_lines) - 1)
+    yield from write_header(sets[0], times[0], step_cap, counts[0], waits[0], deleted)
+    yield from rigid_lines
+    yield from write_header(sets[1], times[1], "0.0", counts[1], waits[1], activated)
+    yield from deformable_lines

@@ -208,13 +208,7 @@ def copy_files(
 def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of a Radioss run with cards."""
     run = read_run(main)
-    printed = [
-        leg
-        for text in card.files.values()
-        for leg in read_legs(SourceFile("the card", text.encode()))
-    ]
-    if not printed:
-        raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
+    printed = _read_printed_legs(main, card)
     if run.starter is None or not run.legs:
         missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
@@ -235,40 +229,56 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     )
     main_name = f"{root}_0000.rad"
     yield main_name, _edit_file(starter, main_text, card.sensors, left_out)
-    further = list(read_blocks(leg.run.block.source))
-    names = [f"{root}_{printed_leg.number:04d}.rad" for printed_leg in printed]
-    for name, text, printed_leg in zip(
-        names, card.files.values(), printed, strict=True
-    ):
-        repeated_blocks = (
-            read_block(block)
-            for block in further
-            if is_repeated(split_keyword(block), printed_leg)
-        )
-        switched_nodes = {
-            node.value for _, _, ids in printed_leg.switched for node in ids
-        } | card.sensors.keys()
-        switched_nodes.update(left_out.values())
-        off_nodes = [
-            node
-            for node in find_bodies_kept_off(run.legs)
-            if node not in switched_nodes
-        ]  # without these lines the bodies would be rigid from time 0
-        # The text of a leg without time-step limit ends with an /RBODY/OFF; these lines are appended to that card.
-        lines = (
-            write_numbers(off_nodes)
-            if printed_leg.cap is None
-            else write_bodies_off(off_nodes)
-        )
-        yield (
-            name,
-            (text + "".join(f"{line}\n" for line in lines)).encode()
-            + b"".join(repeated_blocks),
-        )
-    for name, content in copy_files(
-        run.starter.sources[1:], starter, {main_name, *names}
-    ):
+    names = {main_name}
+    replaced_nodes = {*left_out.values(), *card.sensors}
+    for text, printed_leg in zip(card.files.values(), printed, strict=True):
+        name = f"{root}_{printed_leg.number:04d}.rad"
+        names.add(name)
+        lines = _keep_bodies_off(run.legs, printed_leg, replaced_nodes)
+        engine_text = text + "".join(f"{line}\n" for line in lines)
+        repeated_blocks = _read_repeated_blocks(leg, printed_leg)
+        yield name, engine_text.encode() + repeated_blocks
+    for name, content in copy_files(run.starter.sources[1:], starter, names):
         yield name, _edit_file(name, content, card.sensors, left_out)
+
+
+def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
+    """Read the legs of a run in the printed cards; raise DeckError for the cards of another solver."""
+    printed = [
+        leg
+        for text in card.files.values()
+        for leg in read_legs(SourceFile("the card", text.encode()))
+    ]
+    if not printed:
+        raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
+    return printed
+
+
+def _keep_bodies_off(
+    legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
+) -> Iterator[str]:
+    """Return the lines that keep bodies of the run off in a printed leg; they would be rigid from time 0 otherwise.
+
+    Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
+    """
+    switched_nodes = {node.value for _, _, ids in printed_leg.switched for node in ids}
+    switched_nodes.update(replaced_nodes)
+    off_nodes = [
+        node for node in find_bodies_kept_off(legs) if node not in switched_nodes
+    ]
+    if printed_leg.cap is None:
+        # The text of a leg without time-step limit ends with an /RBODY/OFF; these lines are appended to that card.
+        return write_numbers(off_nodes)
+    return write_bodies_off(off_nodes)
+
+
+def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
+    """Return the blocks of an engine file that are repeated in a printed leg."""
+    return b"".join(
+        read_block(block)
+        for block in read_blocks(leg.run.block.source)
+        if is_repeated(split_keyword(block), printed_leg)
+    )
 
 
 def _edit_file(

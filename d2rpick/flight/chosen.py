@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan, nan
+from math import inf, isnan, nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,7 +17,6 @@ from d2rpick.flight.flight import (
 )
 from d2rpick.flight.internal_energy import (
     find_landing_after,
-    find_quiet_time,
     has_whole_motion,
 )
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.flight.flight import Seen
+    from d2rpick.flight.internal_energy import QuietTime
     from d2rpick.histories.history import History, Samples
 
 # An energy with at least this many turning points may vibrate about a level. With fewer it must be constant.
@@ -44,12 +44,65 @@ class Described(NamedTuple):
     alpha: float | None = None
 
 
-def find_flight(
-    history: History, td: float, seen: Seen, described: Described | None
+def choose_flight(
+    history: History,
+    td: float,
+    seen: Seen,
+    described: Described | None,
+    quiet: QuietTime | None,
+    *,
+    after: float | None = None,
+    landing: float | None = None,
 ) -> Flight:
-    """Choose the flight at ``td``: from the evidence, else from an oscillator, else from the energy alone.
+    """Choose the flight around ``td`` from what was found, or as the user gives it; supported parts never fly.
 
-    ``seen`` is the result of the evidence, ``described`` the window that an oscillator or modes describe.
+    Parameters
+    ----------
+    history : History
+    td : float
+        [time]
+    seen : Seen
+        What the evidence shows at td.
+    described : Described or None
+        The window that an oscillator or modes describe.
+    quiet : QuietTime or None
+        The window around td in which the energy shows no load.
+    after, landing : float, optional
+        End of the load and next contact, if the user gives them [time].
+    """
+    flight = find_flight(history, seen, described, quiet)
+    if seen.held:
+        return flight
+    if after is not None:
+        flight = start_flight_at(history, flight, td, after, described)
+    if landing is not None:
+        flight = end_flight_at(history, flight, td, landing)
+    return _limit_by_supports(history, flight, td)
+
+
+def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
+    """Limit a flight to the time in which no support holds the parts.
+
+    A flight that was found from the part momenta is already limited in this way.
+    """
+    if flight.start is None or flight.refusal or flight.by_parts:
+        return flight
+    start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
+    end = min(end, inf if flight.end is None else flight.end)
+    return flight._replace(
+        start=max(start, flight.start), end=None if end == inf else end
+    )
+
+
+def find_flight(
+    history: History,
+    seen: Seen,
+    described: Described | None,
+    quiet: QuietTime | None,
+) -> Flight:
+    """Choose the flight at a td: from the evidence, else from an oscillator, else from the energy alone.
+
+    The arguments are those of `choose_flight`.
     """
     if seen.held:
         return Flight(refusal=seen.refusal)
@@ -86,10 +139,10 @@ def find_flight(
             gravity=load,
             described=True,
         )
-    quiet = find_quiet_time(history, td)
     if quiet is None:
         return Flight()
-    if refusal := _explain_why_fed(history, quiet.start, td):
+    refusal = _explain_why_fed(history, quiet.start, quiet.td)
+    if refusal:
         return Flight(refusal=refusal)
     end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
     has_energies = (

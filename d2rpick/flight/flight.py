@@ -107,10 +107,16 @@ class Flight(NamedTuple):
         return self.source in _SURE or (self.source in _PARTIAL and self.described)
 
 
+def _return_false(_: float) -> bool:
+    """Return False for each time."""
+    return False
+
+
 class Witness(NamedTuple):
     """A source of evidence: it gives the flight ``around`` a time and the list of all ``flights`` in ascending order.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
+    ``is_contradicted`` tells of a time without a flight whether only the internal energy speaks against one.
     """
 
     source: str
@@ -118,6 +124,7 @@ class Witness(NamedTuple):
     around: Callable[[float], FreeFlight | None]
     flights: Callable[[], tuple[FreeFlight, ...]]
     decisive: bool
+    is_contradicted: Callable[[float], bool]
 
     @classmethod
     def of(
@@ -127,6 +134,7 @@ class Witness(NamedTuple):
         around: Callable[[float], FreeFlight | None],
         *,
         decisive: bool,
+        is_contradicted: Callable[[float], bool] = _return_false,
     ) -> Witness:
         """Make a source of evidence over ``time`` (n,) that computes each flight and the list of flights once."""
         once = cache(around)
@@ -142,6 +150,7 @@ class Witness(NamedTuple):
                 )
             ),
             decisive,
+            is_contradicted,
         )
 
     def holding(self, td: float) -> FreeFlight | None:
@@ -214,7 +223,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
         if flight:
             flights.append((witness.source, flight))
         elif (not flights or _can_deny(witness, flights[0][1])) and witness.counts():
-            refusal = _explain_refusal(history, witness, td)
+            refusal = _explain_refusal(witness, td)
             doubts = tuple(
                 f"the {source} shows a flight there, but {refusal}"
                 for source, _ in flights
@@ -225,23 +234,14 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
     return _join_evidence(history, *flights)
 
 
-def _explain_refusal(history: History, witness: Witness, td: float) -> str:
+def _explain_refusal(witness: Witness, td: float) -> str:
     """Return the reason why td [time] is in no flight, even if the momentum alone shows one."""
-    if witness.source == "momentum":
-        from d2rpick.flight.momentum import (
-            find_flight_around,
-            select_momenta_for_flight,
+    if witness.is_contradicted(td):
+        contradiction = (
+            f"the momentum is that of free flight at td = {td:.6g}, but the internal "
+            "energy is not that of a free vibration"
         )
-
-        if any(
-            find_flight_around(momenta, td, history.balance)
-            for momenta in select_momenta_for_flight(history.momenta)
-        ):
-            contradiction = (
-                f"the momentum is that of free flight at td = {td:.6g}, but the internal "
-                "energy is not that of a free vibration"
-            )
-            return f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
+        return f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
     return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
 
 
@@ -302,7 +302,13 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         momenta = momentum.select_momenta_for_flight(history.momenta)
         around = partial(_find_flight_by_momentum, history, momenta)
         decisive = any(momentum.can_deny_flight(candidate) for candidate in momenta)
-        yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
+        yield Witness.of(
+            "momentum",
+            momenta[0].time,
+            around,
+            decisive=decisive,
+            is_contradicted=partial(_has_flight_by_momentum, history, momenta),
+        )
     forces = history.evidence.forces
     whole = next(
         (candidate for candidate in history.momenta if candidate.parts is None), None
@@ -338,6 +344,17 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         yield Witness.of(
             "energy-balance", balance.time, around, decisive=balance.worked is not None
         )
+
+
+def _has_flight_by_momentum(
+    history: History, momenta: Sequence[Momenta], td: float
+) -> bool:
+    """Return True if the momentum alone, without the internal energy, shows a flight at ``td`` [time]."""
+    from d2rpick.flight.momentum import find_flight_around
+
+    return any(
+        find_flight_around(candidate, td, history.balance) for candidate in momenta
+    )
 
 
 def _find_flight_by_momentum(

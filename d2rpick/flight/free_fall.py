@@ -26,6 +26,8 @@ from d2rpick.histories.samples import find_window, integrate_by_trapezia, remove
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 # Gravity on earth in m, inches and feet per second squared; in other units it is a power of ten times one of these.
@@ -469,9 +471,13 @@ class FreeFall(Law):
             np.polyfit(self.time[states] - self.time[first], undamped, 1)[0]
         )
 
+    def _select_states(self, first: int, last: int) -> slice | NDArray[np.intp]:
+        """Return the states between two states to which the law is fitted."""
+        return slice(first, last + 1)
+
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """Return the deviations of momentum and impulse from straight lines, and the alpha >= 0 that relates them."""
-        states = slice(first, last + 1)
+        states = self._select_states(first, last)
         deviation = remove_line(self.time[states], self._both[states])
         half = self.momentum.shape[1]
         p = deviation[:, :half]

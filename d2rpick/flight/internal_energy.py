@@ -67,43 +67,59 @@ _NOT_FROM_MOTION: Final = 0.1
 class QuietTime(NamedTuple):
     """A window in which the energy shows no load [time]; ``end`` is None if no later contact is seen.
 
-    ``settled`` is the time when the energy had settled; the time from there to ``start`` is left unused for safety.
+    It was found around ``td``.  ``settled`` is the time when the energy had settled; the time from there to ``start``
+    is left unused for safety.
     """
 
     start: float
     end: float | None
     settled: float
+    td: float
 
 
 def find_quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level; None without any."""
     start = float(history.time[0])
+    after_td = int(np.searchsorted(history.time, td, side="right"))
+    states = slice(0, after_td)
     rounding = round_off(history)
-    energy_before = history.between(start, td)[1]
+    energy_before = history.energy[states]
     fallen = (
         rounding > 0
         and energy_before.size >= FEWEST
         and max(energy_before.max(), -energy_before.min()) <= rounding
     )
-    if fallen and td - start >= SHORTEST * (
-        history.time[-1] - start
-    ):  # nothing has happened since the start
-        return QuietTime(start, _find_burst(history, start, td), start)
+    if fallen and td - start >= SHORTEST * (history.time[-1] - start):
+        # nothing has happened since the start
+        burst = _find_burst(history, states)
+        return QuietTime(start, burst, start, td)
     settled = find_end_of_load(history, td)
     if settled is None:
         return None
-    settled = _find_last_push(history, _find_last_excursion(history, settled, td), td)
+    states = _select_states(history, settled, after_td)
+    excursion = _find_last_excursion(history, states)
+    if excursion is not None:
+        settled = excursion
+        states = _select_states(history, settled, after_td)
+    push = _find_last_push(history, states, td - _LATEST * (td - settled))
+    if push is not None:
+        settled = push
+        states = _select_states(history, settled, after_td)
     changes = [
         time
         for time in (
-            _find_burst(history, settled, td),
-            _find_change_of_level(history, settled, td),
+            _find_burst(history, states),
+            _find_change_of_level(history, states),
         )
         if time
     ]
-    return QuietTime(
-        settled + _WAIT * (td - settled), min(changes, default=None), settled
-    )
+    start = settled + _WAIT * (td - settled)
+    return QuietTime(start, min(changes, default=None), settled, td)
+
+
+def _select_states(history: History, start: float, stop: int) -> slice:
+    """Return the states from the time ``start`` up to the state before ``stop``."""
+    return slice(int(np.searchsorted(history.time, start)), stop)
 
 
 @remember
@@ -145,15 +161,18 @@ def find_end_of_load(history: History, td: float) -> float | None:
     so that something still feeds the parts.
     """
     length = td - float(history.time[0])
-    earlier, latest = (
-        np.append(history.between(td - share * length, end)[1], history.energy_at(end))
-        for share, end in ((1 / 4, td - length / 16), (1 / 16, td))
-    )
+    start = td - length / 4
+    middle = td - length / 16
+    first, first_of_latest = np.searchsorted(history.time, [start, middle])
+    after_middle, after_td = np.searchsorted(history.time, [middle, td], side="right")
+    earlier = np.append(history.energy[first:after_middle], history.energy_at(middle))
+    latest = np.append(history.energy[first_of_latest:after_td], history.energy_at(td))
     if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
         return None
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
-    time, energy = history.between(-np.inf, td)
+    time = history.time[:after_td]
+    energy = history.energy[:after_td]
     above = energy > level
     falls = np.flatnonzero(above[:-1] & ~above[1:])
     if not falls.size:
@@ -162,26 +181,28 @@ def find_end_of_load(history: History, td: float) -> float | None:
     return float(find_crossings(time[last], energy[last], level)[0][0])
 
 
-def _find_last_excursion(history: History, start: float, td: float) -> float:
-    """Return the last time from ``start`` to td at which the energy is far from its usual values."""
-    time, energy = history.between(start, td)
-    if time.size < FEWEST:
-        return start
+def _find_last_excursion(history: History, states: slice) -> float | None:
+    """Return the time of the last of some states at which the energy is far from its usual values, or None."""
+    energy = history.energy[states]
+    if energy.size < FEWEST:
+        return None
     low, high = _widen_band(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
     far = np.flatnonzero((energy < low) | (energy > high))
-    return float(time[far[-1]]) if far.size else start
+    return float(history.time[states][far[-1]]) if far.size else None
 
 
-def _find_last_push(history: History, start: float, td: float) -> float:
-    """Return the last time from ``start`` to td when the energy changes much faster than it does shortly before td."""
-    inside = find_window(history.time, start, td)
-    time = history.time[inside]
+def _find_last_push(history: History, states: slice, latest: float) -> float | None:
+    """Return the time of the last of some states to which the energy changes much faster than usual, or None.
+
+    Usual are the rates from the time ``latest`` on.
+    """
+    time = history.time[states]
     if time.size < FEWEST:
-        return start
-    rates = _compute_rates(history)[inside.start : inside.stop - 1]
-    usual = rates[time[1:] >= td - _LATEST * (td - start)].max(initial=0.0)
+        return None
+    rates = _compute_rates(history)[states.start : states.stop - 1]
+    usual = rates[time[1:] >= latest].max(initial=0.0)
     fast = np.flatnonzero(rates > _FASTER * usual)
-    return float(time[fast[-1] + 1]) if fast.size else start
+    return float(time[fast[-1] + 1]) if fast.size else None
 
 
 @remember
@@ -190,29 +211,26 @@ def _compute_rates(history: History) -> Samples:
     return np.asarray(np.abs(np.diff(history.energy)) / np.diff(history.time))
 
 
-def _find_burst(history: History, start: float, td: float) -> float | None:
-    """Return the first time after ``td`` at which the energy exceeds its band from ``start`` to td, or None."""
-    top = _widen_band(history.between(start, td)[1], _BAND_RESERVE)[1]
-    time, energy = history.between(np.nextafter(td, np.inf), np.inf)
-    above = np.flatnonzero(energy > top)
-    return float(time[above[0]]) if above.size else None
+def _find_burst(history: History, states: slice) -> float | None:
+    """Return the first time after some states at which the energy exceeds the band that it has in them, or None."""
+    top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
+    above = np.flatnonzero(history.energy[states.stop :] > top)
+    return float(history.time[states.stop :][above[0]]) if above.size else None
 
 
-def _find_change_of_level(history: History, start: float, td: float) -> float | None:
-    """Return the first time after ``td`` at which the mean energy leaves the band that it kept before td, or None."""
-    inside = find_window(history.time, start, td)
-    width = round(_LEVEL * (inside.stop - inside.start))
+def _find_change_of_level(history: History, states: slice) -> float | None:
+    """Return the first time after some states at which the mean energy leaves the band of their means, or None."""
+    count = states.stop - states.start
+    width = round(_LEVEL * count)
     if width < 1:
         return None
-    sums = _sum_energies(history)[inside.start :]
+    sums = _sum_energies(history)[states.start :]
     means = (sums[width:] - sums[:-width]) / width
-    first_after = (
-        inside.stop - inside.start
-    )  # index of the first mean with all its states after td
-    low, high = _widen_band(means[: first_after - width + 1], 1.0)
-    outside = np.flatnonzero((means[first_after:] < low) | (means[first_after:] > high))
+    # The mean with the index ``count`` is the first with all its states after the given ones.
+    low, high = _widen_band(means[: count - width + 1], 1.0)
+    outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
     if outside.size:
-        return float(history.time[inside.stop + int(outside[0]) + width // 2])
+        return float(history.time[states.stop + int(outside[0]) + width // 2])
     return None
 
 

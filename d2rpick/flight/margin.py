@@ -34,13 +34,15 @@ class Margin(NamedTuple):
     ``source`` is "given", "flight" (3 % of the flight), "landing" (how far a switch may move the landing), "grazing"
     (the same for a grazing contact) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None
     if the files do not show it.  ``grazing`` is the quantity that shows a grazing contact, "force" or "momentum", None
-    for any other contact.
+    for any other contact.  ``rotation`` is "any" if the margin allows for any rotation of the body, since nothing shows
+    how it turns, and "unseen" if such a rotation may make the contact earlier but its size is unknown; else None.
     """
 
     time: float
     source: str
     spread: float | None = None
     grazing: str | None = None
+    rotation: str | None = None
 
 
 def compute_margin(
@@ -48,7 +50,7 @@ def compute_margin(
     flight: Flight,
     given: float | None = None,
     place: float | None = None,
-    turning: float = 0.0,
+    turning: float | None = None,
 ) -> Margin:
     """Return the margin before the contact that ends a flight: the given one, or else how much earlier this may come.
 
@@ -62,8 +64,8 @@ def compute_margin(
         [time]
     place : float, optional
         Place error of the body at the contact [length], see `estimate_landing_spread`.
-    turning : float
-        What the rotation of the body adds to its speed where it touches [length/time].
+    turning : float, optional
+        What the rotation of the body adds to its speed where it touches [length/time], see `estimate_landing_spread`.
     """
     if given is not None:
         return Margin(given, "given")
@@ -88,22 +90,26 @@ def compute_margin(
 
 
 def estimate_landing_spread(
-    history: History, flight: Flight, place: float | None, turning: float = 0.0
+    history: History,
+    flight: Flight,
+    place: float | None,
+    turning: float | None = None,
 ) -> float | None:
     """Return how far a switch may move the next landing, by its velocity error and its position error [time].
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
-    [length/time].  If the surface there moved away from the ground the body would touch elsewhere, and the speed of the
-    centre of mass counts.  None if neither error is known.
+    [length/time], None if that is unknown.  A surface that does not approach the ground by both grazes it.  None if
+    neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    speed = compute_closing_speed(history, flight)
     if place is None or speed is None:
         return spread
-    if speed + turning > 0:
-        speed += turning
-    out_of_place = place / speed if speed > 0 else float("inf")
+    front = speed + (turning or 0.0)
+    if turning is not None and front <= 0:
+        return estimate_grazing_spread(history, flight, place)
+    out_of_place = place / front if front > 0 else float("inf")
     return out_of_place if spread is None else spread + out_of_place
 
 
@@ -116,7 +122,7 @@ def estimate_grazing_spread(
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
     """
     spread = estimate_spread_of_vibration(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    speed = compute_closing_speed(history, flight)
     if spread is None or speed is None or np.isinf(spread):
         amplitude = None
     else:
@@ -145,7 +151,7 @@ class _Contact(NamedTuple):
 
 def _find_contact(history: History, flight: Flight) -> _Contact | None:
     """Return the forces around the contact that ends a flight; None if the momenta do not show them."""
-    evidence = _select_momenta_of_flight(history, flight)
+    evidence = select_momenta_of_flight(history, flight)
     if evidence is None or flight.end is None:
         return None
     from d2rpick.flight.free_fall import FreeFall
@@ -188,8 +194,8 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     momentum less gravity.  False if the record ends before that, or momenta do not show the force.
     """
     contact = _find_contact(history, flight)
-    evidence = _select_momenta_of_flight(history, flight)
-    speed = _compute_closing_speed(history, flight)
+    evidence = select_momenta_of_flight(history, flight)
+    speed = compute_closing_speed(history, flight)
     if contact is None or evidence is None or speed is None:
         return False
     acts = contact.force[contact.begin :] > _GRAZING_FORCE * contact.force.max()
@@ -293,7 +299,7 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
     """Return the momentum of the flying parts, shape (k, 3 or 1); None if unknown or other parts move too."""
-    momentum_of_body = _select_momenta_of_flight(history, flight)
+    momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
     momenta, members = momentum_of_body
@@ -306,7 +312,7 @@ def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
     return values if len(values) > 1 else None
 
 
-def _select_momenta_of_flight(
+def select_momenta_of_flight(
     history: History, flight: Flight
 ) -> tuple[Momenta, Sequence[int]] | None:
     """Return the momenta that show the flying parts, and their columns; None if none is written."""
@@ -325,7 +331,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 
     None if the momentum is not written, or nothing moves.
     """
-    momentum_of_body = _select_momenta_of_flight(history, flight)
+    momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
     momenta, members = momentum_of_body
@@ -339,9 +345,9 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
     return np.asarray(along / size) if size > 0 else None
 
 
-def _compute_closing_speed(history: History, flight: Flight) -> float | None:
+def compute_closing_speed(history: History, flight: Flight) -> float | None:
     """Return the speed along gravity at the end of a flight, or the total speed without gravity; else None."""
-    momentum_of_body = _select_momenta_of_flight(history, flight)
+    momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
     momenta, members = momentum_of_body

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.deck.geometry import Placement
+    from d2rpick.flight.body_frame import Displacements
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.turning import Turning
     from d2rpick.histories.history import History, Samples
@@ -120,6 +121,17 @@ class Drift:
         )
         return self._inside(tr, td, place_at_td[:-1] - place_at_td[-1])
 
+    def errors_at_contact(self, tr: Samples, direction: Samples | None) -> Samples:
+        """Return the position errors at the contact that ends the flight, for tr (k,) [length]; NaN outside the flight.
+
+        With a unit vector (3,) towards the contact, the errors of the node that touches first count if they are larger.
+        """
+        end = float(self.time[-1])
+        errors = self.errors(tr, end)
+        if direction is None or self.turning is None:
+            return errors
+        return np.maximum(errors, self.turning.errors_at_front(tr, direction))
+
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return the rotation errors of the body at td, for tr (k,) [degrees]; NaN if unknown."""
         if self.turning is None:
@@ -143,7 +155,11 @@ class Drift:
         return MOST_OF_PATH * float(self.path[-1])
 
 
-def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None:
+def find_drift(
+    seen: Flying,
+    placement: Placement | None = None,
+    displacements: Displacements | None = None,
+) -> Drift | None:
     """Find how a body in flight is displaced relative to the rigid body that replaces it.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
@@ -154,12 +170,14 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
     seen : Flying
     placement : Placement, optional
         Places of the parts according to the deck, which show how the body turns.
+    displacements : function, optional
+        Reads the displacements of nodes, which show it if the parts do not.
 
     Returns
     -------
     Drift or None
         None if it is unknown: a mass is unknown, there are fewer than three parts, or two with almost no mass beside
-        the third, or the others are far from one rigid body.
+        the third, or the others are far from one rigid body and no deck shows how they turn.
     """
     momenta, masses, inside = (
         seen.momenta,
@@ -195,7 +213,8 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
     ids = [momenta.parts[i].id for i in against]
     part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
     if placement:
-        turning = follow_turning(seen._replace(members=members), against, placement)
+        body = seen._replace(members=members)
+        turning = follow_turning(body, against, placement, displacements)
     else:
         turning = None
     offset = offsets.sum(axis=1)
@@ -203,7 +222,7 @@ def find_drift(seen: Flying, placement: Placement | None = None) -> Drift | None
         bool(rate.any()) and count_periods(time[::stride], offset[::stride], rate) < 1
     )
     drift = Drift(time, offset, path, part, doubt, turning, moving=ids, slow=slow)
-    return drift if doubt <= drift.limit else None
+    return drift if turning or doubt <= drift.limit else None
 
 
 def _integrate_displacements(
@@ -243,7 +262,9 @@ def find_drift_in_flight(
     None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
     """
     flying = _collect_flying(history, flight, parts)
-    return find_drift(flying, placement) if flying else None
+    if flying is None:
+        return None
+    return find_drift(flying, placement, history.evidence.displacements)
 
 
 def find_parts_apart(
@@ -373,6 +394,21 @@ class Bodies:
             return np.asarray(self._each(tr, td).max(axis=0))
         return np.full(tr.shape, np.nan)
 
+    def find_largest_error(
+        self, tr: Samples, direction: Samples | None
+    ) -> float | None:
+        """Return the largest position error at the contact that ends the flight, over tr (k,) and bodies [length].
+
+        ``direction`` is a unit vector (3,) towards the contact.  None if an error is unknown, or all tr lie outside.
+        """
+        if not self._complete:
+            return None
+        errors = np.stack(
+            [drift.errors_at_contact(tr, direction) for drift in self._known]
+        )
+        inside = errors[np.isfinite(errors)]
+        return float(inside.max()) if inside.size else None
+
     @property
     def limit(self) -> float:
         """Return the largest acceptable position error, the smallest of all bodies with moving parts [length]."""
@@ -380,18 +416,15 @@ class Bodies:
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
 
-    def compute_speed_at_front(self, direction: Samples) -> float:
+    def compute_speed_at_front(self, direction: Samples) -> float | None:
         """Return the speed along a unit vector (3,) that the rotation adds at the point of a body farthest along it.
 
-        Of several bodies the least counts [length/time]; 0 if a deck does not show how each of them turns.
+        Of several bodies the least counts [length/time]; None if a deck does not show how each of them turns.
         """
-        turnings = [drift.turning for drift in self._known]
-        if not self._complete:
-            return 0.0
-        return min(
-            0.0 if turning is None else turning.compute_speed_at_front(direction)
-            for turning in turnings
-        )
+        turnings = [drift.turning for drift in self._known if drift.turning]
+        if not self._complete or len(turnings) < len(self._known):
+            return None
+        return min(turning.compute_speed_at_front(direction) for turning in turnings)
 
     def worst(self, tr: float, td: float) -> Off | None:
         """Return the most displaced body; None outside the flight, or if an error is unknown."""

@@ -11,7 +11,8 @@ To first order in their difference psi, an angle,
 
 where of I(t) - I(tr) and h only the parts count that become rigid.  It is linear, so that one pass over the flight
 serves every tr and td.  Parts are points with an inertia of their own that turns with the body: a part that rocks on
-its mounts is not seen.  Places come from where the deck puts the parts, and their momenta since.
+its mounts is not seen.  Places come from where the deck puts the parts, and their momenta since.  If the parts of the
+body lie on a line, or the record begins later than the run, nodes whose motion is written show the frame.
 """
 
 from __future__ import annotations
@@ -20,25 +21,26 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.flight.body_frame import (
+    choose_frame_parts,
+    compute_inertia,
+    compute_second_moments,
+    find_frame_of_nodes,
+    fit_frame,
+)
 from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.geometry import Placement
+    from d2rpick.flight.body_frame import Displacements
     from d2rpick.histories.history import Momenta, Samples
 
-# Largest deviation of the parts from their positions in the rotated deck, relative to the size of the body.
-# A body that is bent more, or placed elsewhere, has no orientation to 0.1 degrees.
-_MOST_BENT: Final = 0.05
 # Largest number of states in the integration. Positions are interpolated linearly: vibration hardly rotates a body.
 _STATES: Final = 2000
-# Connected parts define the body frame if they have this share of its mass, else all parts that do not move.
-_MOST: Final = 0.5
 # The final angular velocity is the mean over the last 1/10 of the flight, which averages out the vibration.
 _LAST: Final = 10
-# Parts are treated as lying on a line if one moment of inertia is below this share of the others.
-_ALONG_LINE: Final = 1e-9
 
 
 class Turning(NamedTuple):
@@ -49,7 +51,8 @@ class Turning(NamedTuple):
     ``inertia`` (n, 3, 3) belongs to those parts; ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3)
     solve the equation of psi.  ``doubt`` is the angle by which bending of the body turns its frame from one time to
     another [rad].  ``nodes`` (k, 3) are those of the parts that become rigid at the last time, against the centre of
-    mass [length], and ``rate`` (3,) is the angular velocity there [rad/time]; both have the axes of the deck.
+    mass [length], and ``rate`` (3,) is the angular velocity there [rad/time]; both have the axes of the deck, to which
+    ``frame`` (3, 3) rotates those of the body.
     """
 
     time: Samples
@@ -61,6 +64,7 @@ class Turning(NamedTuple):
     kept: Samples
     doubt: float
     nodes: Samples
+    frame: Samples
     rate: Samples
 
     def compute_speed_at_front(self, direction: Samples) -> float:
@@ -69,8 +73,23 @@ class Turning(NamedTuple):
         That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
         one [length/time].
         """
-        front = self.nodes[int(np.argmax(self.nodes @ direction))]
+        front = self._find_front(direction)
         return float(np.cross(self.rate, front) @ direction)
+
+    def errors_at_front(self, tr: Samples, direction: Samples) -> Samples:
+        """Return how far the node that is farthest along a unit vector (3,) at the last time is out of place then.
+
+        The body is rigid from ``tr`` (k,) to the last time; the result has shape (k,) [length].
+        """
+        last = float(self.time[-1])
+        slid = self._compute_slides(tr, last)
+        front = self._find_front(direction) @ self.frame
+        moved = slid + np.cross(self.angles(tr, last), front)
+        return np.asarray(np.linalg.norm(moved, axis=1))
+
+    def _find_front(self, direction: Samples) -> Samples:
+        """Return the place (3,) of the node that is farthest along a unit vector (3,) [length]."""
+        return np.asarray(self.nodes[int(np.argmax(self.nodes @ direction))])
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """Return the rotation errors psi at td of a body that is rigid from ``tr`` (k,) on, (k, 3) [rad]."""
@@ -88,14 +107,15 @@ class Turning(NamedTuple):
 
     def offsets(self, tr: Samples, td: float) -> Samples:
         """Return the displacements of a body that is rigid from ``tr`` on, (k, 3) in its own frame [length]."""
-        at_td = np.array([td])
-        slid = _interpolate_at(self.time, self.place, at_td) - _interpolate_at(
-            self.time, self.place, tr
-        )
+        arm = _interpolate_at(self.time, self.arm, np.array([td]))
         return np.asarray(
-            slid
-            + np.cross(self.angles(tr, td), _interpolate_at(self.time, self.arm, at_td))
+            self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)
         )
+
+    def _compute_slides(self, tr: Samples, td: float) -> Samples:
+        """Return the displacements from ``tr`` to td without those by rotation, (k, 3) in the body's frame [length]."""
+        at_td = _interpolate_at(self.time, self.place, np.array([td]))
+        return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
 
 
 class Flying(NamedTuple):
@@ -114,12 +134,15 @@ class Flying(NamedTuple):
 
 
 def follow_turning(
-    seen: Flying, moving: Sequence[int], placement: Placement
+    seen: Flying,
+    moving: Sequence[int],
+    placement: Placement,
+    displacements: Displacements | None = None,
 ) -> Turning | None:
     """Follow the orientation of the body of given parts, from the deck positions of all flying parts.
 
-    ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, the
-    record does not begin with the run, or the parts of the body do not determine its orientation.
+    ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, or
+    neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.
     """
     momenta = seen.momenta
     masses = seen.masses
@@ -127,53 +150,46 @@ def follow_turning(
     all_members = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
     placed = {i: placement.parts.get(momenta.parts[i].id) for i in all_members}
     placed_parts = [part_place for part_place in placed.values() if part_place]
-    time = momenta.time
     mass = masses[all_members]
-    if (
-        len(placed_parts) < len(all_members)
-        or not np.isfinite(mass).all()
-        or time[0] > time[1] - time[0]
-    ):
+    if len(placed_parts) < len(all_members) or not np.isfinite(mass).all():
         return None
-    velocity = momenta.values[:, all_members] / mass[:, np.newaxis]
-    centre = np.stack([part_place.centre for part_place in placed_parts])
-    since = integrate_by_trapezia(time, velocity.reshape(time.size, -1)).reshape(
-        velocity.shape
-    )
-    inside = find_window(time, seen.start, seen.end)
+    inside = find_window(momenta.time, seen.start, seen.end)
     stride = -(-(inside.stop - inside.start) // _STATES)
-    body = _choose_frame_parts(seen, moving, placement)
-    where = (centre + velocity[0] * time[0] + since)[inside][::stride]
+    time = momenta.time[inside][::stride]
+    centre = np.stack([part_place.centre for part_place in placed_parts])
+    since = _integrate_velocities(momenta, all_members, mass)[inside][::stride]
+    body = choose_frame_parts(seen.members, moving, momenta.parts, masses, placement)
     at = {i: place for place, i in enumerate(all_members)}
     rigid = [at[i] for i in seen.members]
     part = [at[i] for i in body]
-    where = where - _weigh_by_mass(where, mass)[:, np.newaxis]
     home = _weigh_by_mass(centre[part], mass[part])
-    shape = centre[part] - home
-    middle = _weigh_by_mass(where[:, part], mass[part])
-    frames = _fit_orientations(
-        shape, where[:, part] - middle[:, np.newaxis], mass[part]
-    )
-    places = where @ frames
-    middle = np.einsum("ni,nij->nj", middle, frames)
-    if (
-        _measure_bending(shape, places[:, part] - middle[:, np.newaxis], mass[part])
-        > _MOST_BENT
-    ):
+    where = None
+    frame = None
+    if momenta.time[0] <= momenta.time[1] - momenta.time[0]:
+        where = centre + since
+        frame = fit_frame(centre[part], where[:, part], mass[part])
+    if frame is None and displacements is not None:
+        ids = [momenta.parts[i].id for i in body]
+        frame = find_frame_of_nodes(ids, placement, displacements, time)
+    if frame is None:
         return None
-    own_inertia = _compute_inertia(
+    if where is None:
+        where = _place_by_frames(centre, since, frame.axes)
+    frames = frame.axes
+    places = (where - _weigh_by_mass(where, mass)[:, np.newaxis]) @ frames
+    middle = _weigh_by_mass(places[:, part], mass[part])
+    own_inertia = compute_inertia(
         np.einsum(
             "p,pij->ij",
             mass,
             np.stack([part_place.spread for part_place in placed_parts]),
         )
     )
-    inertia = _compute_inertia(_compute_second_moments(places, mass)) + own_inertia
+    inertia = compute_inertia(compute_second_moments(places, mass)) + own_inertia
     spin = _integrate_spin(places, mass)
-    moving_inertia = _compute_inertia(
-        _compute_second_moments(places[:, rigid], mass[rigid])
+    moving_inertia = compute_inertia(
+        compute_second_moments(places[:, rigid], mass[rigid])
     )
-    time = time[inside][::stride]
     solved = _solve_turning(
         time,
         frames,
@@ -183,9 +199,6 @@ def follow_turning(
     column = (
         np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis])
         / mass.sum()
-    )
-    doubt = _estimate_doubt(
-        shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part]
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
@@ -199,10 +212,34 @@ def follow_turning(
         arm,
         moving_inertia,
         *solved,
-        doubt,
+        frame.doubt,
         nodes,
+        frames[-1],
         _compute_last_rate(time, frames),
     )
+
+
+def _integrate_velocities(
+    momenta: Momenta, members: Sequence[int], mass: Samples
+) -> Samples:
+    """Return how far parts with these columns have moved since the run began, (n, parts, 3) [length].
+
+    The velocity before the first state is the one of that state.
+    """
+    velocity = momenta.values[:, members] / mass[:, np.newaxis]
+    time = momenta.time
+    since = integrate_by_trapezia(time, velocity.reshape(time.size, -1))
+    return np.asarray(velocity[0] * time[0] + since.reshape(velocity.shape))
+
+
+def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
+    """Return the places (n, parts, 3) of parts in a record that begins in the run, up to a displacement of all.
+
+    Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
+    the frame of the body: a part that vibrates on its mounts does so about its place.
+    """
+    in_frame = np.einsum("nij,pj->npi", frames, centre)
+    return np.asarray(since + (in_frame - since).mean(axis=0))
 
 
 def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
@@ -210,39 +247,6 @@ def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
     count = max(1, (time.size - 1) // _LAST)
     turned = _compute_turns(frames[-count - 1 :]).sum(axis=0)
     return np.asarray(frames[-1] @ turned / (time[-1] - time[-count - 1]))
-
-
-def _choose_frame_parts(
-    seen: Flying, moving: Sequence[int], placement: Placement
-) -> Sequence[int]:
-    """Return the parts that define the body frame: connected parts that do not move relative to each other."""
-    parts = seen.momenta.parts or ()
-    still = [i for i in seen.members if i not in moving]
-    together = placement.hanging_together([parts[i].id for i in still])
-    main = [i for i in still if parts[i].id in together]
-    if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum():
-        return main
-    return still
-
-
-def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return how much the rotation between two times changes if each frame part is left out in turn.
-
-    Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
-    line determine no angle and give 0.
-    """
-    count = mass.size
-    alone = mass * mass.sum() / (mass.sum() - mass)
-    other_inertia = _compute_second_moments(shape[np.newaxis], mass) - np.einsum(
-        "p,pi,pj->pij", alone, shape, shape
-    )
-    light = np.linalg.pinv(
-        _compute_inertia(other_inertia), rcond=_ALONG_LINE, hermitian=True
-    )
-    turned = np.einsum(
-        "pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent)
-    )
-    return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
 
 
 def _solve_turning(
@@ -294,31 +298,6 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
     return np.stack(rotations)
 
 
-def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
-    """Return the rotations (n, 3, 3) that best map a shape (parts, 3) to the positions ``where`` (n, parts, 3)."""
-    left_vectors, _, right_vectors = np.linalg.svd(
-        np.einsum("p,npi,pj->nij", mass, where, shape)
-    )
-    mirrored = np.linalg.det(left_vectors @ right_vectors) < 0
-    left_vectors[mirrored, :, 2] *= -1
-    return np.asarray(left_vectors @ right_vectors)
-
-
-def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return the deviation of parts from their shape, relative to its size across its longest axis."""
-    least_extent = (
-        np.linalg.eigvalsh(_compute_second_moments(shape[np.newaxis], mass)[0])[
-            :2
-        ].sum()
-        / mass.sum()
-    )
-    across = np.sqrt(max(0.0, float(least_extent)))
-    deviation = np.sqrt(
-        np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum())
-    )
-    return float(deviation / across) if across > 0 else np.inf
-
-
 def _compute_turns(frames: Samples) -> Samples:
     """Return the rotation from each frame to the next, (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
@@ -338,19 +317,6 @@ def _compute_turns(frames: Samples) -> Samples:
 def _weigh_by_mass(values: Samples, mass: Samples) -> Samples:
     """Return the mass-weighted mean of values."""
     return np.asarray(np.einsum("p,...pi->...i", mass, values) / mass.sum())
-
-
-def _compute_second_moments(places: Samples, mass: Samples) -> Samples:
-    """Return the second mass moments of positions."""
-    return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
-
-
-def _compute_inertia(second: Samples) -> Samples:
-    """Return the inertia tensor from the second moments (..., 3, 3)."""
-    return np.asarray(
-        np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
-        - second
-    )
 
 
 def _integrate_spin(places: Samples, mass: Samples) -> Samples:

@@ -18,6 +18,7 @@ from d2rpick.base.errors import ChangedError, FormatError
 from d2rpick.base.files import (
     FileState,
     read_at_rest,
+    read_into,
     wait_for_settled_state,
     wait_for_settled_states,
 )
@@ -236,13 +237,8 @@ class OnDisk(Content):
 
     def _fill_from(self, file: FileIO, room: memoryview, begin: int) -> None:
         """Fill ``room`` with the bytes of an open file from ``begin`` on."""
-        file.seek(begin)
-        done = file.readinto(room)
-        while done < len(room):  # a single call reads at most 2 GB
-            count = file.readinto(room[done:])
-            if not count:
-                raise self._shortened()
-            done += count
+        if read_into(file, room, begin) < len(room):
+            raise self._shortened()
 
     def _shortened(self) -> ChangedError:
         """Return the error for a file that became shorter."""

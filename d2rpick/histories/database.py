@@ -78,6 +78,8 @@ class Database:
         Names of the columns of the whole model, without the time.
     parts : tuple of Part
         Parts with their own histories, in the order of the file.
+    node_ids : tuple of int
+        Numbers of the nodes whose displacements are written and can be read.
     time_unit : str
         Unit of the times; empty if the file does not name it, as files of solvers.
     digits : int
@@ -97,6 +99,7 @@ class Database:
     notes: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
     parts: tuple[Part, ...] = ()
+    node_ids: tuple[int, ...] = ()
     digits = DIGITS[8]
     no_channels = ""
     named_by_people = False
@@ -134,6 +137,10 @@ class Database:
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
+
+    def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        raise FormatError(f"{self.source}: displacements of nodes are not read from it")
 
     @property
     def energy_channel(self) -> str | None:
@@ -297,6 +304,20 @@ class Legs:
             values.flags.writeable = False
             self._energies = tuple(ids), values
         return values
+
+    @cached_property
+    def node_ids(self) -> tuple[int, ...]:
+        """Numbers of the nodes whose displacements all legs have."""
+        common = set(self._legs[0].node_ids)
+        for leg in self._legs[1:]:
+            common.intersection_update(leg.node_ids)
+        return tuple(id_ for id_ in self._legs[0].node_ids if id_ in common)
+
+    def node_displacements(self, ids: Sequence[int]) -> Samples:
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        return self._joined(
+            [leg.node_displacements(ids) for leg in self._legs], self._kept[0]
+        )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Return the precisions of the leg with the coarsest numbers."""

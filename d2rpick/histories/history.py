@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -162,6 +162,14 @@ class Track(NamedTuple):
     values: Samples
 
 
+class NodeMotion(NamedTuple):
+    """Displacements of the nodes ``ids`` since the start of the run: (n, nodes, 3) over ``time`` (n,) [length]."""
+
+    time: Samples
+    ids: tuple[int, ...]
+    displacements: Samples
+
+
 @remember
 def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
     """Return the sum of the momenta of some parts, read-only, shape (n, 3)."""
@@ -229,17 +237,22 @@ class Given:
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
     known momenta, in the order of the parts, NaN if unknown; None if no mass is known. ``forces`` are those of contacts
-    and rigid walls.
+    and rigid walls. ``written`` is all data of a switched run, whose parts are unknown while they were rigid.
     """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
     forces: tuple[ContactForce, ...] = ()
+    written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002
         """Return internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if not written."""
         return None
+
+    def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
+        """Return the displacements of those of some nodes that are written; None without any."""
+        return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if not written."""
@@ -443,16 +456,28 @@ class History:
         return self.time[inside], self.energy[inside]
 
 
-def select_states(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
-    size = record.time.size
-    rows = {}
+def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a record with one row for each of its times, by name. Part masses have no such rows."""
+    columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)
-        is_initial = record_field.init and record_field.name != "masses"
-        if is_initial and isinstance(values, np.ndarray) and len(values) == size:
-            rows[record_field.name] = values[states]
-    return replace(record, **rows)  # type: ignore[arg-type]
+        is_given = record_field.init and record_field.name != "masses"
+        if (
+            is_given
+            and isinstance(values, np.ndarray)
+            and len(values) == record.time.size
+        ):
+            columns[record_field.name] = values
+    return columns
+
+
+def select_states(
+    record: Record, states: slice | NDArray[np.bool_ | np.intp]
+) -> Record:
+    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
+    columns = list_columns(record)
+    rows: dict[str, Any] = {name: values[states] for name, values in columns.items()}
+    return replace(record, **rows)
 
 
 def freeze(values: ArrayLike) -> Samples:

@@ -105,7 +105,7 @@ def find_ending(history: str) -> str | None:
         return None
     else:
         listings = [f"{match['root']}_{int(match['leg']):04d}.out"]
-    tails = [_read_ends(listing)[1] for listing in listings]
+    tails = [read_tail(listing, _TAIL) for listing in listings]
     for words, manner in _ENDINGS.items():
         if any(words in tail and _STOPPED not in tail for tail in tails):
             return manner
@@ -116,11 +116,19 @@ def _read_ends(path: str) -> tuple[bytes, bytes]:
     """Return the first and the last bytes of a file; empty if it cannot be read."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123  starts faster
-            head = stream.read(_HEAD)
-            stream.seek(max(os.fstat(stream.fileno()).st_size - _TAIL, 0))
-            return head, stream.read()
+            return stream.read(_HEAD), read_tail(path, _TAIL)
     except (OSError, ValueError):
         return b"", b""
+
+
+def read_tail(path: str, size: int) -> bytes:
+    """Return the last bytes of a file; empty if it cannot be read."""
+    try:
+        with open(path, "rb") as stream:  # noqa: PTH123  starts faster
+            stream.seek(max(os.fstat(stream.fileno()).st_size - size, 0))
+            return stream.read()
+    except (OSError, ValueError):
+        return b""
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
@@ -165,10 +173,8 @@ def read_timing(path: str) -> Timing:
         If the file cannot be read, or has no usable summary of CPU times.
     """
     data = _read_listing(path)
-    timing = None
-    if _SUMMARY in data:
-        timing = _read_radioss_timing(path, data)
-    elif _TIMING in data:
+    timing = find_radioss_timing(path, data)
+    if timing is None and _TIMING in data:
         timing = _read_d3hsp_timing(path, data)
     if timing is None or not timing.cycles or not 0 < timing.elements <= timing.total:
         raise FormatError(
@@ -212,8 +218,10 @@ def _read_listing(path: str) -> bytes:
         ) from None
 
 
-def _read_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing; a missing number gives 0."""
+def find_radioss_timing(name: str, data: bytes) -> Timing | None:
+    """Return the CPU times of a Radioss listing; None without a summary; a missing number gives 0."""
+    if _SUMMARY not in data:
+        return None
     summary = data[data.rindex(_SUMMARY) :]
     numbers = []
     for pattern in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES):

@@ -13,7 +13,15 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import check_energy_of_parts, note_doubts
-from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
+from d2rpick.histories.history import (
+    Balance,
+    Given,
+    History,
+    Momenta,
+    NodeMotion,
+    Samples,
+    Track,
+)
 from d2rpick.histories.meaning import (
     is_any_internal_energy,
     note_other_quantity,
@@ -253,6 +261,15 @@ class OpenedRun:
             momentum = read_momentum(database) if database.channels else None
             if momentum:
                 return replace(momentum, surroundings=self.surroundings)
+        return None
+
+    def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
+        """Return the displacements of those of some nodes that are written; None without any."""
+        for database in self.databases:
+            written = [id_ for id_ in database.node_ids if id_ in ids]
+            if written:
+                values = database.node_displacements(written)
+                return NodeMotion(database.time, tuple(written), values)
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
@@ -511,6 +528,10 @@ class _Written(Given):
         from d2rpick.histories.balance import read_terms
 
         return read_terms(self._run.databases)
+
+    def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
+        """Return the displacements of those of some nodes that are written; None without any."""
+        return self._run.displacements(ids)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
         """Return internal energies of given parts; None if they are not written."""

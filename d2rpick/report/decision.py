@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from d2rpick.choice.pair.grades import GOOD
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Grade
@@ -62,11 +64,26 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     return f". Reason: {reasons}. To improve: {cures}"
 
 
-def format_in_short(decision: Decision) -> str:
-    """Return the verdict and the reason why it is not better."""
+def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
+    """Number the reasons why verdicts are not better, so that a table can explain each below it once."""
+    reasons = (
+        decision.general_reason for decision in decisions if decision.grade != GOOD
+    )
+    return {
+        reason: number for number, reason in enumerate(dict.fromkeys(reasons), start=1)
+    }
+
+
+def format_with_number(decision: Decision, numbers: Mapping[str, int]) -> str:
+    """Return the verdict with the number of the reason why it is not better."""
     if decision.grade == GOOD:
         return decision.verdict
-    return f"{decision.verdict}: {decision.reason}"
+    return f"{decision.verdict} ({numbers[decision.general_reason]})"
+
+
+def list_numbered_reasons(numbers: Mapping[str, int]) -> Lines:
+    """Return the numbers in a table of verdicts, each with its reason."""
+    return [(f"({number})", reason) for reason, number in numbers.items()]
 
 
 def format_in_full(decision: Decision) -> str:

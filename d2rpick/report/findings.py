@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
     Field,
     get_kind,
     many,
+    maybe,
     one_of,
     row,
     write_csv,
@@ -28,6 +30,7 @@ from d2rpick.rules.rule import MAIN_DECK, Example, Rule
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions
 
 
@@ -73,7 +76,10 @@ _WINDOW: Final = row(
     Field("file", "text"),
     Field("line", _LINE),
     Field("deck", "text"),
-)
+    Field("verdict", maybe(keys.VERDICT), "what to do with the pair; null if no history judges it", later=True),
+    Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
+    Field("cure", "text?", "how to improve the pair, as text; empty for a good pair", later=True),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -119,15 +125,36 @@ def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
 
 
 def as_csv(checks: Checks, _: DisplayOptions) -> str:
-    """Return CSV with one row per finding and a column for each key of ``findings`` in the JSON output."""
-    return write_csv(FINDING.keys, map(FINDING.plain, _list_findings(checks)))
+    """Return CSV with one row per verdict and per finding, and a column for each key of ``findings`` in the JSON output.
+
+    The row of a verdict has no rule.
+    """
+    verdicts = [
+        Finding(
+            "",
+            Severity.INFO,
+            judged.sentence,
+            judged.deck,
+            judged.file,
+            judged.line,
+            judged.column,
+        )
+        for judged in _list_judged_windows(checks)
+    ]
+    rows = (*verdicts, *_list_findings(checks))
+    return write_csv(FINDING.keys, map(FINDING.plain, rows))
 
 
 def as_markdown(checks: Checks, _: DisplayOptions) -> str:
-    """Return the findings as a Markdown table, with their number."""
+    """Return the verdicts as a list and the findings as a Markdown table, with their number."""
     rows = [list(FINDING.plain(finding).values()) for finding in _list_findings(checks)]
+    verdicts = [
+        f"* {tables.escape_markdown(judged.sentence)}"
+        for judged in _list_judged_windows(checks)
+    ]
     return "\n\n".join(
         [
+            *(["\n".join(verdicts)] if verdicts else []),
             *([tables.as_markdown(FINDING.keys, rows)] if rows else []),
             _summarize_findings(checks),
         ]
@@ -135,7 +162,12 @@ def as_markdown(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_github(checks: Checks, _: DisplayOptions) -> str:
-    """Return workflow commands that make GitHub Actions show the findings next to the lines of a deck."""
+    """Return workflow commands that make GitHub Actions show verdicts and findings next to the lines of a deck."""
+    verdicts = [
+        f"::notice file={_escape_for_github(judged.file, ',:')},line={judged.line},col={judged.column},"
+        f"title={judged.verdict}::{_escape_for_github(judged.sentence)}"
+        for judged in _list_judged_windows(checks)
+    ]
     annotations = [
         f"::{_GITHUB[f.severity]} file={_escape_for_github(f.file, ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escape_for_github(f.message)}"
@@ -147,6 +179,7 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
     )
     return "\n".join(
         [
+            *verdicts,
             *annotations,
             *(
                 f"::error file={_escape_for_github(deck, ',:')}::{_escape_for_github(reason)}"
@@ -157,7 +190,10 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_junit(checks: Checks, _: DisplayOptions) -> str:
-    """Return a suite per deck and a case per finding. Findings less severe than ``fail_on`` pass with a message."""
+    """Return a suite per deck and a case per finding. Findings less severe than ``fail_on`` pass with a message.
+
+    The output of the suite is the verdicts.
+    """
     from xml.etree import ElementTree as ET  # Imported here to keep start-up fast.
 
     suites = ET.Element("testsuites", name="d2rpick check")
@@ -197,6 +233,12 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
             ET.SubElement(
                 case, "failure" if fails else "system-out", about
             ).text = _escape_for_xml(_format_finding(finding))
+        verdicts = [
+            _escape_for_xml(judged.sentence)
+            for judged in _list_judged_windows(checks, result)
+        ]
+        if verdicts:
+            ET.SubElement(suite, "system-out").text = "\n".join(verdicts)
     ET.indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(
         suites, encoding="unicode"
@@ -262,6 +304,7 @@ def as_sarif(checks: Checks, _: DisplayOptions) -> str:
             }
         ],
         "results": results,
+        "properties": {"windows": list(_list_window_objects(checks))},
     }
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
@@ -275,16 +318,64 @@ def _format_finding(finding: Finding) -> str:
 
 
 def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
-    """Return a line per window; windows with the same cards and times share one line."""
+    """Return a line per window, with its verdict, reason and cure if it was judged."""
+    for group in _group_alike(windows):
+        first = group[0]
+        location = f"{_format_path(first.place.file, root)}:{first.place.line}"
+        yield f"{_describe_windows(group)} ({location})"
+        if decision := first.decision:
+            yield f"  why         {decision.reason}"
+            if decision.cure:
+                yield f"  to improve  {decision.cure}"
+
+
+def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
+    """Yield the windows in groups of the same cards, times and verdict."""
     alike = (
-        ((window.cards, window.unit.kind, window.tr, window.td), window)
+        (
+            (window.cards, window.unit.kind, window.tr, window.td, window.decision),
+            window,
+        )
         for window in windows
     )
-    for group in group_values(alike).values():
-        first = group[0]
-        until = "the end" if first.td is None else f"{first.td:g}"
-        names = name_units((window.unit.id for window in group), first.unit.kind)
-        yield f"{names}: rigid from {first.tr:g} to {until} ({_format_path(first.place.file, root)}:{first.place.line})"
+    yield from group_values(alike).values()
+
+
+def _describe_windows(group: Sequence[CheckedWindow]) -> str:
+    """Describe windows that are alike: the verdict if they were judged, the parts and the times."""
+    first = group[0]
+    until = "the end" if first.td is None else f"{first.td:g}"
+    names = name_units((window.unit.id for window in group), first.unit.kind)
+    verdict = f"{first.decision.verdict}: " if first.decision else ""
+    return f"{verdict}{names}: rigid from {first.tr:g} to {until}"
+
+
+class _JudgedWindow(NamedTuple):
+    """The verdict on windows that are alike, in words, and the place of the card that opens them."""
+
+    verdict: str
+    sentence: str
+    deck: str
+    file: str
+    line: int
+    column: int
+
+
+def _list_judged_windows(checks: Checks, *results: Checked) -> Iterator[_JudgedWindow]:
+    """Yield the verdicts on the windows of all decks, or of some ``results``, with displayed paths."""
+    for result in results or checks.results:
+        for group in _group_alike(result.windows):
+            place = group[0].place
+            if decision := group[0].decision:
+                cure = f". To improve: {decision.cure}" if decision.cure else ""
+                yield _JudgedWindow(
+                    decision.verdict,
+                    f"{_describe_windows(group)}. Reason: {decision.reason}{cure}",
+                    _format_path(result.deck, checks.root),
+                    _format_path(place.file, checks.root),
+                    place.line,
+                    place.column,
+                )
 
 
 def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
@@ -301,7 +392,17 @@ def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
                 "file": _format_path(location.file, checks.root),
                 "line": location.line,
                 "deck": _format_path(result.deck, checks.root),
+                **_list_decision_values(window.decision),
             }
+
+
+def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
+    """Return the verdict on a pair, its reason and its cure by key; None if the pair was not judged."""
+    return {
+        "verdict": decision and decision.verdict,
+        "verdict_reason": decision and decision.reason,
+        "cure": decision and decision.cure,
+    }
 
 
 def _list_findings(checks: Checks, *results: Checked) -> Iterator[Finding]:

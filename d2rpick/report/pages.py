@@ -175,6 +175,8 @@ def _build_candidates(answer: PairSuggestion) -> Iterator[Markup]:
         "Candidates",
         *select_known_columns(*suggestion.build_candidate_table(answer, _MOST_ROWS)),
     )
+    listed = answer.candidates[:_MOST_ROWS]
+    yield build_pairs(suggestion.list_candidate_reasons(answer, listed))
     if (hidden_count := len(answer.candidates) - _MOST_ROWS) > 0:
         yield make_element(
             "p", f"{hidden_count} more in the csv and json results.", class_="soft"
@@ -252,14 +254,17 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
+    comparison = make_element(
+        "section",
+        build_pairs(trade_off.list_page_lines(answer)),
+        build_remarks(further),
+    )
+    front = [_build_choice(answer.suggestion), comparison]
+    if answer.requested:
+        front.reverse()
     return _write_run_page(
         record,
-        _build_choice(answer.suggestion),
-        make_element(
-            "section",
-            make_element("p", trade_off.give_answer(answer)),
-            build_remarks(further),
-        ),
+        *front,
         build_explorer(record.explorer),
         _draw_suggestion(answer.suggestion),
         _build_figure("explore-", caption, "trade_off", answer, page=True),
@@ -268,6 +273,7 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
             _build_starred_table(
                 "Pairs", *select_known_columns(*trade_off.build_offer_table(best))
             ),
+            build_pairs(trade_off.list_offer_reasons(best)),
             hidden,
         ),
         *_build_lower_sections(answer.suggestion, record),
@@ -562,7 +568,7 @@ _LOOKS: Final[
         lambda answer: (("measure", "value"), verdict.list_known_measures(answer)),
     ),
     "trade_off": (
-        lambda answer: [("", trade_off.give_answer(answer))],
+        trade_off.list_answer_lines,
         lambda answer: trade_off.build_offer_table(
             trade_off.select_offers(answer, _FEW_ROWS)
         ),
@@ -581,6 +587,17 @@ _LOOKS: Final[
         ),
     ),
     "study": (study.list_outcome, study.build_run_table),
+}
+
+
+# For each kind of answer with numbered verdicts in its table, the reasons behind the numbers.
+_REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
+    "suggestion": lambda answer: suggestion.list_candidate_reasons(
+        answer, answer.candidates[:_FEW_ROWS]
+    ),
+    "trade_off": lambda answer: trade_off.list_offer_reasons(
+        trade_off.select_offers(answer, _FEW_ROWS)
+    ),
 }
 
 
@@ -617,6 +634,11 @@ def show_at_a_glance(kind: str, answer: Any, figure: Figure | None) -> str:
         if len(rows) > _FEW_ROWS
         else []
     )
+    if kind in _REASONS:
+        lines += [
+            make_element("div", f"{number} {reason}")
+            for number, reason in _REASONS[kind](answer)
+        ]
     return make_element("div", *lines, *([_build_picture(figure)] if figure else []))
 
 

@@ -10,11 +10,13 @@ from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_accuracy,
-    format_in_short,
     format_rigid_time,
     format_saving,
+    format_with_number,
+    list_numbered_reasons,
     list_statements,
     list_verdict_lines,
+    number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.situation import list_situation_heading
@@ -102,6 +104,7 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
     If nothing is recommended, candidates are listed only if all details are asked for.
     """
     above = list_situation_heading(answer.situation, verbose=display.verbose)
+    listed = answer.candidates[: display.limit]
     lines = [
         *tables.format_in_line((*list_verdict(answer), *list_next_step(answer))),
         "",
@@ -118,6 +121,7 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
         ]
         hidden_count = len(answer.candidates) - display.limit
         lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
+        lines += tables.format_in_line(list_candidate_reasons(answer, listed))
     return "\n".join(lines)
 
 
@@ -126,7 +130,9 @@ def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
     above = tables.format_as_list((*list_verdict(answer), *list_next_step(answer)))
     below = tables.format_as_list((*list_evidence(answer), *list_alternatives(answer)))
     table = tables.as_markdown(*_select_shown_candidates(answer, display))
-    return "\n\n".join([*above, table, *below])
+    listed = answer.candidates[: display.limit]
+    reasons = tables.format_as_list(list_candidate_reasons(answer, listed))
+    return "\n\n".join([*above, table, *reasons, *below])
 
 
 def _select_shown_candidates(
@@ -318,7 +324,12 @@ def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
 def build_candidate_table(
     answer: PairSuggestion, limit: int
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of the first ``limit`` candidates."""
+    """Return the column names and cells of the first ``limit`` candidates.
+
+    `list_candidate_reasons` explains the numbers beside the verdicts.
+    """
+    listed = answer.candidates[:limit]
+    numbers = _number_candidate_reasons(answer, listed)
     columns: dict[str, Callable[[Candidate], tables.Cell]] = {
         "": lambda c: "*" if c.recommended else " ",
         "rank": lambda c: c.rank,
@@ -333,18 +344,23 @@ def build_candidate_table(
         "residual": lambda c: tables.format_measure(c.residual),
         "timing tolerance": lambda c: tables.format_if_known(c.timing_tolerance, ".1e"),
         "rigid for": lambda c: c.rigid_time,
-        "verdict": lambda c: _shorten_verdict(answer, c),
+        "verdict": lambda c: format_with_number(answer.decision_on(c), numbers),
     }
-    return tables.fill_table(columns, answer.candidates[:limit])
+    return tables.fill_table(columns, listed)
 
 
-def _shorten_verdict(answer: PairSuggestion, candidate: Candidate) -> str:
-    """Return the verdict on a candidate, with its reason unless the lines above the table already give it."""
-    decision = answer.decision_on(candidate)
-    answered = answer.decision
-    if answered is not None and decision.reason == answered.reason:
-        return decision.verdict
-    return format_in_short(decision)
+def list_candidate_reasons(
+    answer: PairSuggestion, listed: Sequence[Candidate]
+) -> list[tuple[str, str]]:
+    """Return the reasons of the verdicts on the listed candidates, each with its number in the table."""
+    return list_numbered_reasons(_number_candidate_reasons(answer, listed))
+
+
+def _number_candidate_reasons(
+    answer: PairSuggestion, listed: Sequence[Candidate]
+) -> dict[str, int]:
+    """Number the reasons why the verdicts on the listed candidates are not better."""
+    return number_reasons(map(answer.decision_on, listed))
 
 
 def _format_times(pair: Pair) -> str:

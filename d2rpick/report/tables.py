@@ -113,7 +113,7 @@ def format_in_line(
 ) -> list[str]:
     """Return lines of a name and a text, aligned at ``width`` characters, by default the length of the longest name."""
     lines = list(named_texts)
-    width = width or max(len(name) for name, _ in lines)
+    width = width or max((len(name) for name, _ in lines), default=0)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
 
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import make_printable
 from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import format_in_short, list_verdict_lines
+from d2rpick.report.decision import (
+    format_with_number,
+    list_numbered_reasons,
+    list_verdict_lines,
+    number_reasons,
+)
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.situation import describe_input
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.report.formats import DisplayOptions
@@ -61,12 +65,13 @@ _SPARE: Final = (
     "kinetic fraction",
 )
 
+_NONE_ADMISSIBLE: Final = "No td in the range has an admissible tr."
 _NONE_BETTER: Final = "No other td in the range is better."
 _NOT_HALVED: Final = "No other td in the range halves this error without giving up more than half of the rigid time."
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the answer in one sentence, the verdict on the best pair, the Pareto-optimal offers, and the input."""
+    """Return the verdict with other choices, the Pareto-optimal offers, the reasons of verdicts, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -79,8 +84,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     low, high = trade_off.td_window
     window = f"{len(trade_off.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
-        make_printable(give_answer(trade_off)),
-        *tables.format_in_line(list_offer_verdict(trade_off)),
+        *tables.format_in_line(list_answer_lines(trade_off)),
         "",
         offered,
     ]
@@ -91,29 +95,111 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
         ("history", describe_input(trade_off.situation.history)),
         ("td", window),
     ]
+    lines += tables.format_in_line(list_offer_reasons(listed_offers))
     return "\n".join([*lines, "", *tables.format_in_line(input_lines)])
 
 
-def list_offer_verdict(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and how to improve it, as (name, text) pairs."""
+def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
+    """Return what to do with the requested or chosen pair, why, and what other td offer, as (name, text) pairs."""
+    if trade_off.requested is None:
+        return [
+            *_list_verdict_of_chosen(trade_off),
+            *_list_costs_of_other_offers(trade_off),
+        ]
+    return [
+        *_list_verdict_of_requested(trade_off, trade_off.requested),
+        *_list_choice_if_td_is_free(trade_off, trade_off.requested),
+    ]
+
+
+def list_page_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
+    """Return the lines of the answer that a page does not show as the card of the chosen pair."""
+    if trade_off.requested:
+        return list_answer_lines(trade_off)
+    return _list_costs_of_other_offers(trade_off)
+
+
+def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
+    """Return the verdict on the pair that ``suggest`` chooses in the range."""
     best = trade_off.recommended
     decision = trade_off.decide_on(best) if best else None
     if best is None or best.best is None or decision is None:
         return [("no pair to use", _explain_why_no_pair(trade_off))]
-    (verdict, times), *others = list_verdict_lines(decision, best.best.tr, best.td)
-    return [(verdict, f"{times}, the best pair of the range"), *others]
+    verdict_lines = list_verdict_lines(decision, best.best.tr, best.td)
+    return [(decision.verdict, _describe_offer(best)), *verdict_lines[1:]]
+
+
+def _list_verdict_of_requested(
+    trade_off: TradeOff, requested: Offer
+) -> list[tuple[str, str]]:
+    """Return the verdict on the best pair at the requested td, and the next better td."""
+    decision = trade_off.decide_on(requested)
+    if requested.best is None or decision is None:
+        lines = [
+            (
+                "no pair to use",
+                f"td = {requested.td:.6g}: {requested.answer.why_none}",
+            )
+        ]
+    else:
+        lines = list_verdict_lines(decision, requested.best.tr, requested.td)
+    return [*lines, ("other td", _describe_step(trade_off, requested))]
+
+
+def _list_choice_if_td_is_free(
+    trade_off: TradeOff, requested: Offer
+) -> list[tuple[str, str]]:
+    """Return the pair that ``suggest`` chooses in the range, unless it is the one at the requested td."""
+    best = trade_off.recommended
+    if best is None or best is requested or best.decision is None:
+        return []
+    return [
+        ("if td is free", f"{best.decision.verdict}: {_describe_offer(best)}"),
+    ]
+
+
+def _list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
+    """Return what a smaller error than that of the recommended pair costs, and what a longer rigid time costs."""
+    best = trade_off.recommended
+    if best is None:
+        return []
+    lines = []
+    accurate = trade_off.more_accurate
+    if accurate:
+        cost_text = _describe_cost_change(best, accurate)
+        lines.append(("smaller error", f"{_describe_error_at(accurate)} {cost_text}"))
+    longest = trade_off.start
+    if longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0):
+        cost_text = _describe_cost_change(best, longest)
+        lines.append(("longest", f"{_describe_error_at(longest)} {cost_text}"))
+    return lines
+
+
+def _describe_offer(offer: Offer) -> str:
+    """Describe an offer with a pair: its times, its error and its rigid time."""
+    times = f"tr = {offer.tr:.6g}, td = {offer.td:.6g}"
+    return (
+        f"{times}, {_format_offer_error(offer)}, rigid for {offer.rigid_time or 0:.6g}"
+    )
+
+
+def _describe_error_at(offer: Offer) -> str:
+    """Describe the error of an offer as the beginning of a sentence."""
+    return f"td = {offer.td:.6g} with {_format_offer_error(offer)}"
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the offers of the text table as a Markdown table, with the answer below it."""
-    offer_table = tables.select_known_columns(
-        *build_offer_table(select_offers(trade_off, display.limit))
+    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts below."""
+    listed_offers = select_offers(trade_off, display.limit)
+    offer_table = tables.select_known_columns(*build_offer_table(listed_offers))
+    reasons = tables.format_as_list(list_offer_reasons(listed_offers))
+    return "\n\n".join(
+        [
+            *tables.format_as_list(list_answer_lines(trade_off)),
+            tables.as_markdown(*offer_table),
+            *reasons,
+        ]
     )
-    paragraphs = [
-        tables.escape_markdown(give_answer(trade_off)),
-        *tables.format_as_list(list_offer_verdict(trade_off)),
-    ]
-    return "\n\n".join([*paragraphs, tables.as_markdown(*offer_table)])
 
 
 def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
@@ -122,36 +208,34 @@ def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
 
 
 def give_answer(trade_off: TradeOff) -> str:
-    """Return in one sentence how good the requested td is, and the gain or cost of another td.
-
-    Without a requested td, other td are compared with the td that saves most.
-    """
-    start = trade_off.start
-    step = trade_off.step
-    unit = trade_off.situation.history.time_unit
-    if start is None:
-        return "no td in the range has an admissible tr"
-    start_text = f"td = {start.td:.6g}"
-    if not trade_off.requested:
-        start_text += f" {_describe_longest(start)}"
-    if start.best is None:
-        quality_text = f"{start_text} has no admissible tr"
-        return (
-            quality_text
-            if step is None
-            else f"{quality_text}; {_describe_distance(start, step, unit)} has one"
-        )
-    if not trade_off.requested:
-        quality_text = f"{start_text}, {_format_offer_error(start)}"
+    """Return in one sentence the pair to use, or how good the requested td is and what another td changes."""
+    requested = trade_off.requested
+    if requested is None:
+        return ": ".join(_list_verdict_of_chosen(trade_off)[0])
+    if requested.best is None:
+        quality_text = f"td = {requested.td:.6g} has no admissible tr"
     else:
-        quality_text = f"{start_text}: {_format_offer_error(start)}"
+        quality_text = f"td = {requested.td:.6g}: {_format_offer_error(requested)}"
+    separator = ". " if trade_off.step is None else "; "
+    return f"{quality_text}{separator}{_describe_step(trade_off, requested)}"
+
+
+def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
+    """Describe what the next better td changes, or that there is none."""
+    step = trade_off.step
     if step is None:
-        small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{quality_text}. {_NONE_BETTER if small else _NOT_HALVED}"
-    distance = _describe_distance(start, step, unit)
-    error_change = _describe_error_change(start, step)
-    cost_change = _describe_cost_change(start, step)
-    return f"{quality_text}; {distance} {error_change} and {cost_change}"
+        small = requested.error is not None and requested.error <= EQUALLY_GOOD
+        if requested.best is None:
+            return _NONE_ADMISSIBLE
+        return _NONE_BETTER if small else _NOT_HALVED
+    distance = _describe_distance(
+        requested, step, trade_off.situation.history.time_unit
+    )
+    if requested.best is None:
+        return f"{distance} has an admissible tr"
+    error_change = _describe_error_change(requested, step)
+    cost_change = _describe_cost_change(requested, step)
+    return f"{distance} {error_change} and {cost_change}"
 
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
@@ -180,11 +264,6 @@ def _explain_why_no_pair(trade_off: TradeOff) -> str:
         return "no td in the range has an admissible tr"
     highest = max(trade_off.offers, key=lambda offer: offer.energy_td)
     return f"no td in the range has an admissible tr; td = {highest.td:.6g}: {highest.answer.why_none}"
-
-
-def _describe_longest(start: Offer) -> str:
-    """Describe in which respect the td with which others are compared exceeds them."""
-    return "is rigid for longest" if start.saving is None else "saves the most CPU time"
 
 
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
@@ -241,6 +320,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
             trade_off.recommended,
             trade_off.start,
             trade_off.step,
+            trade_off.more_accurate,
         )
         if offer
     }
@@ -259,8 +339,29 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 def build_offer_table(
     offers: Sequence[Offer],
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of the offers; the recommended offer has a star."""
-    return tables.fill_table(_COLUMNS, offers)
+    """Return the column names and cells of the offers; the recommended offer has a star.
+
+    `list_offer_reasons` explains the numbers beside the verdicts.
+    """
+    numbers = _number_offer_reasons(offers)
+    columns = {**_COLUMNS, "verdict": lambda offer: _format_verdict(offer, numbers)}
+    return tables.fill_table(columns, offers)
+
+
+def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
+    """Return the reasons of the verdicts on the offers, each with its number in the table."""
+    return list_numbered_reasons(_number_offer_reasons(offers))
+
+
+def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
+    """Number the reasons why the verdicts on the offers are not better."""
+    return number_reasons(offer.decision for offer in offers if offer.decision)
+
+
+def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
+    """Return the verdict on the pair of an offer with the number of its reason."""
+    decision = offer.decision
+    return format_with_number(decision, numbers) if decision else "no admissible tr"
 
 
 def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
@@ -284,7 +385,4 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "of simulated time": _make_getter_of_best("rigid_fraction", ".1%"),
     "CPU time": _make_getter_of_best("run_time_share", ".0%"),
     "timing tolerance": _make_getter_of_best("timing_tolerance", ".1e"),
-    "verdict": lambda offer: (
-        format_in_short(offer.decision) if offer.decision else offer.answer.why_none
-    ),
 }

@@ -62,6 +62,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "names the nearest flight.",
             "Choose a td in a flight. If the evidence is wrong, give --after and --landing.",
         ),
+        "rotation-unknown": Explanation(
+            "Neither the parts nor the motion of nodes shows how the body rotates in the flight. With the deck, the "
+            "margin before the next contact is the one for the worst rotation that the kinetic energy allows. Without "
+            "the deck, the margin may be too short.",
+            "Give the deck with --deck. In a Radioss run, also write the motion of at least three nodes of the body "
+            "that do not lie on a line (/TH/NODE). For other solvers, set the margin with --margin.",
+        ),
         "td-after-contact": Explanation(
             "The next contact begins before td, or td lies within the margin before it. The parts would hit something "
             "while they are rigid.",

@@ -29,8 +29,9 @@ from d2rpick.rules.rule import Rule
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.deck.card import CardField
-    from d2rpick.deck.switching import SwitchSet, SwitchWindow, Unit
+    from d2rpick.deck.switching import SwitchSet, Unit
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
@@ -195,6 +196,7 @@ class CheckedWindow(NamedTuple):
     """A rigid window; ``place`` is the card that opens it. It does not keep its deck in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
+    ``decision`` is the verdict on its pair of times; None if no history judges the pair.
     """
 
     unit: Unit
@@ -202,6 +204,7 @@ class CheckedWindow(NamedTuple):
     td: float | None
     place: CardField
     cards: tuple[int, int | None]
+    decision: Decision | None = None
 
     @property
     def part(self) -> int | None:
@@ -299,7 +302,7 @@ def check_deck(
             finding.rule,
         )
     )
-    windows = tuple(_strip_windows(case.windows.windows))
+    windows = tuple(_strip_windows(case))
     remarks = tuple(_list_remarks(case.deck))
     return Checked(
         path,
@@ -330,13 +333,24 @@ def _remove_consequences(findings: list[Finding]) -> list[Finding]:
     ]
 
 
-def _strip_windows(windows: Iterable[SwitchWindow]) -> Iterator[CheckedWindow]:
-    """Yield the windows in a form that does not keep the deck in memory."""
+def _strip_windows(case: Case) -> Iterator[CheckedWindow]:
+    """Yield the windows with their verdicts, in a form that does not keep the deck in memory."""
     numbers: dict[SwitchSet, int] = {}
-    for unit, tr, td, opened, closed in windows:
+    windows = case.windows.windows
+    unjudged = [None] * len(windows)
+    decisions = [judgement.decision for _, judgement in case.judgements] or unjudged
+    for window, decision in zip(windows, decisions, strict=True):
+        unit, tr, td, opened, closed = window
         opening = numbers.setdefault(opened.by, len(numbers))
         closing = numbers.setdefault(closed.by, len(numbers)) if closed else None
-        yield CheckedWindow(unit, tr, td, opened.by.card.here, (opening, closing))
+        yield CheckedWindow(
+            unit,
+            tr,
+            td,
+            opened.by.card.here,
+            (opening, closing),
+            decision,
+        )
 
 
 @cache

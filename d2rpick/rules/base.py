@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.unswitchable import Unswitchable
     from d2rpick.rules.by_force import Forced
     from d2rpick.rules.by_sensor import Sensed
-    from d2rpick.rules.judgement import HistoryJudge
+    from d2rpick.rules.judgement import HistoryJudge, Judgement
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
@@ -158,6 +158,32 @@ class Case:
             windows += switch.windows
         windows.sort(key=lambda window: (window.unit, window.tr))
         return timed._replace(windows=tuple(windows))
+
+    @cached_property
+    def judgements(self) -> tuple[tuple[SwitchWindow, Judgement], ...]:
+        """Return the windows with their judgements by the history; empty without a history."""
+        if self.judge is None:
+            return ()
+        windows = self.windows.windows
+        parts_by_times = group_values(
+            ((window.tr, window.td), window.part)
+            for window in windows
+            if window.part is not None
+        )
+        by_condition = {
+            window for switch in self.by_condition for window in switch.windows
+        }
+        return tuple(
+            (
+                window,
+                self.judge.judge(
+                    window,
+                    parts_by_times.get((window.tr, window.td), ()),
+                    by_force=window in by_condition,
+                ),
+            )
+            for window in windows
+        )
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.switching import SwitchWindow
@@ -66,6 +67,13 @@ class Fault(NamedTuple):
     message: str
 
 
+class Judgement(NamedTuple):
+    """The objections to a window, and the verdict on its pair; None if the history cannot judge the pair."""
+
+    faults: tuple[Fault, ...] = ()
+    decision: Decision | None = None
+
+
 @dataclass
 class HistoryJudge:
     """Judges windows by a reference run: by the energy of the switched parts, or of the whole model without part data.
@@ -81,8 +89,8 @@ class HistoryJudge:
     settings: Settings
     done: tuple[Times, ...] = ()
     _references: dict[tuple[int, ...], Reference] = field(default_factory=dict)
-    _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = (
-        field(default_factory=dict)
+    _judgements: dict[tuple[tuple[int, ...], float, float | None], Judgement] = field(
+        default_factory=dict
     )
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
@@ -98,7 +106,7 @@ class HistoryJudge:
         if run.surroundings is not self.run.surroundings:
             self.run = run
             self._references.clear()
-            self._faults.clear()
+            self._judgements.clear()
 
     @property
     def end(self) -> float:
@@ -136,10 +144,10 @@ class HistoryJudge:
             self._references[parts] = Reference.of(self.run, chosen)
         return self._references[parts]
 
-    def faults(
+    def judge(
         self, window: SwitchWindow, together: Iterable[int], *, by_force: bool = False
-    ) -> tuple[Fault, ...]:
-        """Return all objections to a window. If td is missing or not after tr, only tr is judged.
+    ) -> Judgement:
+        """Judge a window. If td is missing or not after tr, only tr is judged.
 
         ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
         judged between states of the history.
@@ -152,7 +160,7 @@ class HistoryJudge:
             and window.part not in history_parts
         ):
             problem = f"not in the history, which has {name_units(history_parts)}; correct the id, or write its energy"
-            return (Fault("D2R205", False, problem),)
+            return Judgement((Fault("D2R205", False, problem),))
         parts: tuple[int, ...] = ()
         if window.part is not None:
             parts = tuple(part for part in history_parts if part in {*together})
@@ -160,14 +168,14 @@ class HistoryJudge:
         if by_force:
             tr, td = narrow_to_states(self._reference(parts).history.time, tr, td)
         key = parts, tr, td
-        if key not in self._faults:
+        if key not in self._judgements:
             if history_parts and not parts:
                 which = "members" if window.unit.is_set else "parts"
                 members = f"the {which} of {window.unit.kind} {window.unit.id}"
                 problem = f"{members} are unknown, so the window is judged by the energy of the whole model"
                 self._cautions[Caution("judged-by-whole", problem)] = []
-            self._faults[key] = tuple(self._judged(parts, tr, td))
-        return self._faults[key]
+            self._judgements[key] = self._judge_times(parts, tr, td)
+        return self._judgements[key]
 
     def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
         """Return the parts that have internal energy at any time; None if the history lacks one of them."""
@@ -223,55 +231,57 @@ class HistoryJudge:
             return ()
         return tuple(part.id for part in self.run.parts)
 
-    def _judged(
+    def _judge_times(
         self, parts: tuple[int, ...], tr: float, td: float | None
-    ) -> Iterator[Fault]:
+    ) -> Judgement:
+        """Judge the times of parts that are switched together."""
         reference = self._reference(parts)
         history = reference.history
-        first = float(history.time[0])
-        last = float(history.time[-1])
-        times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
-        outside = [
-            (name == "td", name, time)
-            for name, time in times
-            if not first <= time <= last
-        ]
-        for at_td, name, time in outside:
+        outside = tuple(_find_times_outside(history, tr, td))
+        if outside:
+            return Judgement(outside)
+        if td is None:
+            return Judgement(tuple(_judge_open_window(history, tr, self.settings)))
+        if (tr, td) in self.done:
+            return Judgement()
+        verdict = verify_run(reference, tr, td, self.settings)
+        if parts and not history.energy.any():
+            # Parts without energy have no locked-in energy (a note reports this). Only the flight limits the times.
+            is_flight_known = verdict.situation.flight.start is not None
+            return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
+        for caution in verdict.cautions:
+            if caution.code in _KEPT:
+                self._cautions.setdefault(caution, []).extend(parts)
+        return Judgement(tuple(find_faults(verdict)), verdict.decision)
+
+
+def _find_times_outside(
+    history: History, tr: float, td: float | None
+) -> Iterator[Fault]:
+    """Yield objections to times outside the history, and to a td that seems to have another unit."""
+    first = float(history.time[0])
+    last = float(history.time[-1])
+    named_times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
+    is_inside = True
+    for name, time in named_times:
+        if not first <= time <= last:
+            is_inside = False
             message = (
                 f"{name} = {time:.6g} lies outside the history ({first:.6g} to {last:.6g}); "
                 f"correct it, or run the reference longer"
             )
-            yield Fault("D2R205", at_td, message)
-        if outside:
-            return
-        if td is None:
-            yield from _judge_open_window(history, tr, self.settings)
-            return
-        if times_in_record := convert_to_unit_of_record(
-            history.time, [td], history.time_unit
-        ):
-            problem = f"td = {td:.6g} lies within the first ten states of the history ({first:.6g} to {last:.6g})"
-            yield Fault(
-                "D2R205",
-                True,
-                f"{problem}, but {times_in_record[0]:.6g} lies in it too; give deck and history in the same time unit",
-            )
-            return
-        if (tr, td) in self.done:
-            return
-        verdict = verify_run(reference, tr, td, self.settings)
-        if parts and not history.energy.any():
-            # Parts without energy have no locked-in energy (a note reports this). Only the flight limits the times.
-            yield from (
-                _judge_flight(verdict)
-                if verdict.situation.flight.start is not None
-                else ()
-            )
-            return
-        for caution in verdict.cautions:
-            if caution.code in _KEPT:
-                self._cautions.setdefault(caution, []).extend(parts)
-        yield from find_faults(verdict)
+            yield Fault("D2R205", name == "td", message)
+    if td is None or not is_inside:
+        return
+    if times_in_record := convert_to_unit_of_record(
+        history.time, [td], history.time_unit
+    ):
+        problem = f"td = {td:.6g} lies within the first ten states of the history ({first:.6g} to {last:.6g})"
+        yield Fault(
+            "D2R205",
+            True,
+            f"{problem}, but {times_in_record[0]:.6g} lies in it too; give deck and history in the same time unit",
+        )
 
 
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:

@@ -42,9 +42,7 @@ frame
 END = "*END\n"
 GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
 _SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
-_BODY: Final = (
-    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
-)
+_BODY: Final = "/RBODY/1\nbox\n      1808         0         0         0                   0         7\n"
 WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 
 
@@ -141,12 +139,10 @@ def make_window(tr: str, td: str, more: str = "") -> Example:
 PASS = Example(GOOD)
 
 
-def write_starter_deck(
-    group: str = GROUP, body: str = "      1808", more: str = ""
-) -> str:
+def write_starter_deck(group: str = GROUP, more: str = "") -> str:
     """Return a starter deck with one part, which is a rigid body on a node group. The text ``more`` follows."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
-    return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
+    return f"{head}{_SHELL}{_BODY}{group}{more}/END\n"
 
 
 def write_engine_files(

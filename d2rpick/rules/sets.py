@@ -70,9 +70,9 @@ def _make_force_deck(
     return make_deck(contact + card)
 
 
-def _write_contact(name: str, number: int = 7) -> str:
+def _write_contact(name: str) -> str:
     zeros = f"{0:10d}" * 8 + "\n"
-    return f"*CONTACT_AUTOMATIC_{name}_ID\n{number:10d}floor\n" + 3 * zeros
+    return f"*CONTACT_AUTOMATIC_{name}_ID\n         7floor\n" + 3 * zeros
 
 
 _FLOOR: Final = _write_contact("SURFACE_TO_SURFACE")

@@ -338,19 +338,9 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
     """Yield the objections of one rule that follow from the energy history; parts of one card share an objection."""
-    assert case.judge is not None
-    windows = case.windows.windows
-    parts_by_times = group_values(
-        ((window.tr, window.td), window.part)
-        for window in windows
-        if window.part is not None
-    )
-    by_condition = {window for switch in case.by_condition for window in switch.windows}
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
-    for judged_window in windows:
-        together = parts_by_times.get((judged_window.tr, judged_window.td), ())
-        by_force = judged_window in by_condition
-        for fault in case.judge.faults(judged_window, together, by_force=by_force):
+    for judged_window, judgement in case.judgements:
+        for fault in judgement.faults:
             event = judged_window.closed if fault.at_td else judged_window.opened
             if event and fault.rule == rule_id:
                 key = event.by, judged_window.unit.kind, fault.message

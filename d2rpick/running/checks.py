@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import DeckError, RangeError, name_units
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.pieces import find_supports
-from d2rpick.deck.radioss_deck import get_number
 from d2rpick.deck.radioss_run import read_run
-from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
+from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.flight.window import FEWEST
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_deck import Starter
@@ -38,16 +37,6 @@ def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None
         )
 
 
-def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
-    """Yield sensor kind and id of each contact and rigid wall."""
-    for card in starter.named("INTER"):
-        if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            # The keyword is /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id.
-            yield "INTER", get_number(card, 2) or get_number(card, 3)
-    for card in starter.named("RWALL"):
-        yield "RWALL", get_number(card, -1)
-
-
 def check_driven(
     path: str,
     inventory: Inventory,
@@ -66,7 +55,7 @@ def check_driven(
     """
     refuse_held(path, inventory, parts)
     starter = read_run(path).starter
-    if starter is None or not any(contacts_of(starter)):
+    if starter is None or not list_forces(starter):
         raise DeckError(f"{path}: {NO_CONTACT}")
     not_springs = {part for part in parts if not {*inventory.counts[part]} <= DISCRETE}
     _check_history(path, starter, not_springs)
@@ -87,13 +76,10 @@ def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
     cards = [card for card in starter.named("TH") if card.words[1:2] == ("PART",)]
     written: set[int] = set()
     for card in cards:
-        texts = [
-            row.text.split() for row in card.rows[1:] if not row.text.startswith("#")
-        ]
-        variables = {word for words in texts for word in words if not word.isdigit()}
-        ids = {int(word) for words in texts for word in words if word.isdigit()}
-        if variables & {"DEF", "XMOM"}:
-            written |= ids or {*parts}
+        rows = [row.text for row in card.rows[1:] if not row.text.startswith("#")]
+        words = {*" ".join(rows).split()}
+        if words & {"DEF", "XMOM"}:
+            written |= {int(word) for word in words if word.isdigit()} or {*parts}
     if missing := sorted({*parts} - written):
         where = cards[0].at if cards else path
         raise DeckError(

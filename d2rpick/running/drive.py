@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import Caution, D2RPickError
+import numpy as np
+
+from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import (
     add_checksum,
     append_as_a_whole,
@@ -26,7 +28,6 @@ from d2rpick.running.sequence import (
     choose_next_leg,
     collect_joined_legs,
     find_next_window,
-    get_flight_findings,
 )
 from d2rpick.running.swing import find_swing
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from d2rpick.base.errors import Caution
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.writing import DrivenDeck
     from d2rpick.histories.history import History
@@ -93,26 +95,6 @@ class Driver:
     observer: Observer
     told: Callable[[str], None]
     at: Order | None = None
-    _repeated: set[Order] = field(default_factory=set)
-
-    @property
-    def legs(self) -> list[Leg]:
-        """Computed legs, including discarded ones, without the legs that a restart from an earlier time has undone."""
-        legs: list[Leg] = []
-        for record in self.journal.records:
-            if record["event"] == "ended":
-                legs.append(_read_leg(record))
-            elif record["event"] == "back":
-                del legs[record["legs"] :]
-        return legs
-
-    @property
-    def out_of_place(self) -> tuple[Caution, ...]:
-        """The warnings for all windows at whose tr parts still oscillated."""
-        messages = dict.fromkeys(
-            record["place"] for record in self.journal.all("ended")
-        )
-        return tuple(Caution("out-of-place", text) for text in messages if text)
 
     def prepare(self) -> None:
         """Copy the deck into the folder and run the starter, unless this has already been done.
@@ -123,15 +105,15 @@ class Driver:
             If the starter fails.
         """
         self._wait_for_end()  # an earlier driver may have left a solver running
-        if self.journal.all("prepared") and self.solver.whole(0):
+        if self.journal.has("prepared") and self.solver.whole(0):
             return
-        folder = self.solver.folder
-        for name, content in self.deck.files.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            write_as_a_whole(folder / name, content)
         # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
-        first_engine_file = self.solver.file(1, ".rad")
-        write_as_a_whole(first_engine_file, self.deck.leg(1, self.deck.end, None))
+        first_engine_file = self.solver.file(1, ".rad").name
+        first_leg = self.deck.leg(1, self.deck.end, None)
+        for name, content in {**self.deck.files, first_engine_file: first_leg}.items():
+            path = self.solver.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_as_a_whole(path, content)
         self._start_solver("starter", 0)
         self._wait_for_end()
         if not self.solver.started_well():
@@ -155,51 +137,46 @@ class Driver:
         D2RPickError
             If the solver fails or the disk is full.  The run continues from there when it is driven again.
         """
-        if legs := self.legs:
+        if legs := self.journal.legs:
             self.told(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
         while order := self._choose_next():
             self.at = order
-            if not self._is_computed(order):
+            # An earlier driver may have begun the leg, and the solver has finished it since.
+            begun = self.journal.records[-1].get("order") == [*order]
+            if not begun or self._find_problem(order):
                 self._start(order)
             self._wait_for_end()
-            self._end(order)
+            if problem := self._find_problem(order):
+                self._recover(order, problem)
+            else:
+                self._end(order)
         self.at = None
 
     def _choose_next(self) -> Order | None:
         """Choose the next leg. If the restart from which it begins is damaged, go back leg by leg to a complete one."""
-        legs = self.legs
-        leg_count = len(legs)
-        order = choose_next_leg(legs, self.limits)
-        while order is not None and legs and not self.solver.whole(order.number - 1):
-            legs.pop()
+        while True:
+            legs = self.journal.legs
             order = choose_next_leg(legs, self.limits)
-        if len(legs) < leg_count:
-            self.journal.add("back", legs=len(legs))
-            start = 0.0 if order is None else order.start
+            if order is None or not legs or self.solver.whole(order.number - 1):
+                return order
+            self.journal.add("back", legs=len(legs) - 1)
             self.told(
-                f"the restart file of the last engine run is incomplete: the run goes back to {start:.6g}"
+                "the restart file of the last engine run is incomplete: the run goes back to "
+                f"{legs[-1].order.start:.6g}"
             )
-        return order
-
-    def _is_computed(self, order: Order) -> bool:
-        """Return True if an earlier driver began this leg, and the solver has finished it since."""
-        last = self.journal.records[-1]
-        begun = last["event"] == "started" and Order(*last["order"]) == order
-        return (
-            begun
-            and self.solver.ended_well(order.number)
-            and self.solver.whole(order.number)
-        )
 
     def _start(self, order: Order) -> None:
         """Write the engine file of a leg and start the engine."""
         number = order.number
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
-        already_rigid = order.rigid and len(collect_joined_legs(order, self.legs)) > 1
-        largest_step = self._limit_rigid_step() if order.rigid else None
+        legs = self.journal.legs
+        already_rigid = order.rigid and len(collect_joined_legs(order, legs)) > 1
+        largest_step = None
+        if order.rigid:
+            largest_step = _limit_rigid_step(legs, self.deck.interval)
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
@@ -212,17 +189,6 @@ class Driver:
         """Start the solver on the deck of a leg: the starter if ``leg`` is 0, else the engine."""
         deck = self.solver.file(number, ".rad").name
         self.solver.start(self.commands.words(program, deck), number)
-
-    def _limit_rigid_step(self) -> float:
-        """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
-        steps = [
-            leg.length / leg.cycles
-            for leg in self.legs
-            if not leg.order.rigid and leg.cycles
-        ]
-        interval = self.deck.interval
-        smallest = float(f"{min([interval, *steps]):.3g}")
-        return min(interval, _STEP_RATIO * smallest)
 
     def _wait_for_end(self) -> None:
         """Wait until no solver is running; report silence, and stop the solver on KeyboardInterrupt."""
@@ -241,113 +207,74 @@ class Driver:
             self.solver.end()
             raise
 
-    def _end(self, order: Order) -> None:
-        """Write the findings of a leg to the journal.
+    def _find_problem(self, order: Order) -> str:
+        """Say why a leg is not done; "" if it ended normally, with complete restarts and a history up to its end."""
+        number = order.number
+        if not self.solver.ended_well(number):
+            return f"the solver failed: {self.solver.last_words(number)}; continue with --resume"
+        times = self.solver.read_times(number)
+        step = np.diff(times).max(initial=self.limits.interval)
+        is_long_enough = np.any(times >= order.until - 3 * step)
+        if is_long_enough and self.solver.whole(number):
+            return ""
+        return "the engine run left no complete restart file; make room on the disk, then --resume"
 
-        A leg that left no complete restart or history is computed again, once.
+    def _recover(self, order: Order, problem: str) -> None:
+        """Note that a leg has failed, so that it is computed again.
+
+        If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
+        back by the leg that wrote it.
 
         Raises
         ------
         D2RPickError
-            If the solver failed, or the leg left no complete restart for the second time.
+            If the solver reported an error for the first time, or the leg has failed before.
         """
-        number = order.number
-        if not self.solver.ended_well(number):
-            self._fail(order)
-            return
-        cycles, cpu = self.solver.took(number)
-        if not self._is_whole(order, cycles):
-            self._repeat(order)
-            return
-        legs = self.legs
+        has_failed = self.journal.has_failed
+        self.journal.add("failed", leg=order.number)
+        name = f"engine run {order.number}"
+        legs = self.journal.legs
+        begins = bool(np.any(self.solver.read_times(order.number) >= order.start))
+        if not has_failed and self.solver.ended_well(order.number):
+            self.told(
+                f"{name}: its restart file or history is incomplete; computing it again from {order.start:.6g}"
+            )
+        elif has_failed and legs and not begins:
+            self.journal.add("back", legs=len(legs) - 1)
+            self.told(
+                f"{name} failed again before its first state; computing the engine run before it again"
+            )
+        else:
+            raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
+
+    def _end(self, order: Order) -> None:
+        """Write the findings of a leg to the journal."""
+        number, legs = order.number, self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
-        findings = self.observer.look(
-            order,
-            [self.solver.history(leg.number) for leg in joined_legs],
-            _find_longest_wait(legs, first.start),
-        )
-        leg = Leg(order, findings, cycles, cpu)
-        place = _warn_of_swing([*legs, leg], self.limits)
-        if place:
-            self.told(f"warning: out-of-place: {place}")
-        self.journal.add(
-            "ended", order=order, seen=findings, cycles=cycles, cpu=cpu, place=place
-        )
+        histories = [self.solver.history(leg.number) for leg in joined_legs]
+        wait_before = _find_longest_wait(legs, first.start)
+        findings = self.observer.look(order, histories, wait_before)
+        cycles, cpu = self.solver.took(number)
+        self.journal.add("ended", order=order, seen=findings, cycles=cycles, cpu=cpu)
+        if findings.contact is not None:
+            window = find_next_window(self.journal.legs, self.limits)
+            if window.warning:
+                self.told(f"warning: out-of-place: {window.warning}")
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
             # The restart before the window is needed if the window is dropped.
             kept_restarts.add(first.number - 1)
         self.solver.keep(kept_restarts)
 
-    def _is_whole(self, order: Order, cycles: int | None) -> bool:
-        """Return True if a leg wrote complete restart files and a history that extends to the end of the leg."""
-        step = (order.until - order.start) / (cycles or 1)
-        last_state = order.until - max(3 * self.limits.interval, 2 * step)
-        number = order.number
-        return self.solver.whole(number) and self.solver.came_to(number, last_state)
 
-    def _repeat(self, order: Order) -> None:
-        """Note that a leg is to be computed again; raise D2RPickError if it has been repeated before."""
-        if order in self._repeated:
-            listing = self.solver.file(order.number, ".out")
-            raise D2RPickError(
-                f"{listing}: the engine run left no complete restart file; make room on the disk, then --resume"
-            )
-        self._repeated.add(order)
-        self.told(
-            f"engine run {order.number}: its restart file or history is incomplete; computing it "
-            f"again from {order.start:.6g}"
-        )
-        self.journal.add("lost", order=order)
-
-    def _fail(self, order: Order) -> None:
-        """Raise D2RPickError with the error of the solver.
-
-        If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
-        back by the leg that wrote it, without an error.
-        """
-        events = [record["event"] for record in self.journal.records]
-        since_last_leg = max(
-            (row for row, event in enumerate(events) if event in ("ended", "back")),
-            default=0,
-        )
-        self.journal.add("failed", order=order)
-        failed_before = "failed" in events[since_last_leg:]
-        has_states = self.solver.came_to(order.number, order.start)
-        if not failed_before or not self.legs or has_states:
-            words = self.solver.last_words(order.number)
-            path = self.solver.file(order.number, ".out")
-            raise D2RPickError(
-                f"{path}: the solver failed: {words}; continue with --resume"
-            )
-        self.journal.add("back", legs=len(self.legs) - 1)
-        self.told(
-            f"engine run {order.number} failed again before its first state; computing the engine run before it again"
-        )
-
-
-def _warn_of_swing(legs: Sequence[Leg], limits: Limits) -> str:
-    """Return a warning if parts oscillate too much in the window that ends with the last leg; otherwise ""."""
-    if legs[-1].findings.contact is None:
-        return ""
-    window = find_next_window(legs, limits)
-    findings = get_flight_findings(legs)
-    if window.reason or findings.steady_from <= window.td - window.free:
-        return ""
-    return f"tr = {window.tr:.6g}: {findings.swing_warning}"
-
-
-def _read_leg(record: dict[str, Any]) -> Leg:
-    """Make a leg from a record of the journal."""
-    findings = LegFindings(*record["seen"])
-    short = tuple((start, end) for start, end in findings.short)
-    return Leg(
-        Order(*record["order"]),
-        findings._replace(short=short),
-        record["cycles"],
-        record["cpu"],
-    )
+def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
+    """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+    steps = [
+        leg.length / leg.cycles for leg in legs if not leg.order.rigid and leg.cycles
+    ]
+    smallest = float(f"{min([interval, *steps]):.3g}")
+    return min(interval, _STEP_RATIO * smallest)
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
@@ -380,8 +307,8 @@ class Observer:
             parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
         )
         self._looks = Looks(selection, inventory)
-        self._given, self._of_deck = wait, of_deck
-        self._evidence, self._motion = GrowingEvidence(), InnerMotion(None, of_deck)
+        self._waits = (wait, of_deck)
+        self._evidence, self._motion = GrowingEvidence(), InnerMotion(*self._waits)
 
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
@@ -395,63 +322,44 @@ class Observer:
         states, follows = self._looks.new_states(names)
         if not follows:
             self._evidence = GrowingEvidence()
-            self._motion = InnerMotion(None, self._of_deck, wait_before)
+            self._motion = InnerMotion(*self._waits, wait_before)
         if states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
         history = self._evidence.history
         if order.rigid:
-            start = float(history.time[0])
-            return LegFindings(contact=self._evidence.contact_after(start))
+            return LegFindings(contact=self._evidence.find_contact())
         return self._find_flight(order, history)
 
     def _find_flight(self, order: Order, history: History) -> LegFindings:
         """Return the findings of a deformable leg."""
         now = float(history.time[-1])
-        flights = self._evidence.flights(self._get_needed_wait)
+        flights = self._evidence.flights(self._motion.wait)
         free = self._evidence.free_since(now)
-        shown_wait = self._motion.wait(free, now)
-        wait = self._get_needed_wait(free, now)
-        idle = shown_wait is not None and shown_wait.source == "at-rest"
-        why = shown_wait.reason if shown_wait else ""
-        if self._given is not None and not idle:
-            longer = shown_wait is not None and shown_wait.time > self._given
-            why = f"as given, but {why}" if longer else "as given"
+        wait = self._motion.wait(free, now)
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
+        # Flights that were a little too short to be switched.
+        short_flights = tuple(
+            (start, end)
+            for start, end in self._evidence.pauses(order.start)
+            if wait is not None
+            and end - start >= _REPORTED * wait.time
+            and start >= order.switch_after
+        )
         return LegFindings(
             free=free,
-            wait=wait,
-            why=why,
+            wait=wait.time if wait else None,
+            why=wait.reason if wait else "",
             flies=flies,
             tr=tr,
-            idle=idle,
-            short=self._find_short_flights(order, wait),
+            idle=wait is not None and wait.source == "at-rest",
+            short=short_flights,
             swing=self._motion.longest_swing(now),
             steady_from=swing.flight if swing else 0.0,
             swing_warning=swing.told if swing else "",
         )
-
-    def _find_short_flights(
-        self, order: Order, wait: float | None
-    ) -> tuple[tuple[float, float], ...]:
-        """Return the start and end of each flight in a leg that was a little too short to be switched."""
-        if not wait:
-            return ()
-        return tuple(
-            (start, end)
-            for start, end in self._evidence.pauses(order.start)
-            if end - start >= _REPORTED * wait and start >= order.switch_after
-        )
-
-    def _get_needed_wait(self, start: float, now: float) -> float | None:
-        """Return the wait after ``start`` [time]: the user's, or the record's if nothing vibrates; None if unknown."""
-        shown_wait = self._motion.wait(start, now)
-        at_rest = shown_wait is not None and shown_wait.source == "at-rest"
-        if self._given is not None and not at_rest:
-            return self._given
-        return shown_wait.time if shown_wait else None
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
@@ -476,20 +384,43 @@ class Journal:
         ]
         self._line_end = b"\n" if content and not content.endswith(b"\n") else b""
 
-    def add(self, event: str, **values: Any) -> dict[str, Any]:
+    @property
+    def legs(self) -> list[Leg]:
+        """Computed legs, including discarded ones, without the legs that a restart from an earlier time has undone."""
+        legs: list[Leg] = []
+        for record in self.records:
+            if record["event"] == "ended":
+                legs.append(_read_leg(record))
+            elif record["event"] == "back":
+                del legs[record["legs"] :]
+        return legs
+
+    @property
+    def has_failed(self) -> bool:
+        """True if the next leg has failed before."""
+        outcomes = ("prepared", "ended", "back", "failed")
+        events = [record["event"] for record in self.records]
+        return [event for event in events if event in outcomes][-1:] == ["failed"]
+
+    def has(self, event: str) -> bool:
+        """Return True if there is a record of an event."""
+        return any(record["event"] == event for record in self.records)
+
+    def add(self, event: str, **values: Any) -> None:
         """Append a record; raise D2RPickError if the disk is full."""
-        record = {"event": event, **values}
-        line = add_checksum(json.dumps(record, allow_nan=False)).encode()
+        line = json.dumps({"event": event, **values}, allow_nan=False)
         try:
-            append_as_a_whole(self.path, self._line_end + line + b"\n", durable=True)
+            content = self._line_end + add_checksum(line).encode() + b"\n"
+            append_as_a_whole(self.path, content, durable=True)
         except OSError as error:
             raise D2RPickError(
                 f"{self.path}: cannot be written ({error.strerror}); make room, then --resume"
             ) from None
         self._line_end = b""
-        self.records.append(record)
-        return record
+        self.records.append(json.loads(line))
 
-    def all(self, event: str) -> list[dict[str, Any]]:
-        """Return the records of one kind, in the order in which they were written."""
-        return [record for record in self.records if record["event"] == event]
+
+def _read_leg(record: dict[str, Any]) -> Leg:
+    """Make a leg from a record of the journal."""
+    order, findings = Order(*record["order"]), LegFindings(*record["seen"])
+    return Leg(order, findings, record["cycles"], record["cpu"])

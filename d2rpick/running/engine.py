@@ -16,16 +16,22 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
+
 from d2rpick.base.errors import (
     ConfigurationError,
     D2RPickError,
     FormatError,
     make_printable,
 )
+from d2rpick.deck.engine_files import MOST_LEGS
 from d2rpick.histories.formats.radioss_th import TimeHistory
+from d2rpick.histories.listings import find_radioss_timing, read_tail
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
+
+    from d2rpick.histories.history import Samples
 
 # Paths of the programs in an installation, and their arguments.
 _PROGRAMS: Final = {
@@ -36,9 +42,7 @@ _PROGRAMS: Final = {
     "engine": (("bin/engine_gf", "exec/engine_linux64_gf"), "-i {deck} -nt {threads}"),
 }
 _HOME: Final = "OPENRADIOSS_PATH"
-_STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
-_CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
-_TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
+_STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
 # Errors in the listing of a starter are followed by much output, so more bytes are read from its end (_LISTING_SIZE).
@@ -67,22 +71,20 @@ class Commands(NamedTuple):
             If the command cannot be split or does not name the deck, or no installation is known.
         """
         template = getattr(self, program)
-        try:
-            split = (
-                _find_installed(program) if template is None else shlex.split(template)
+        if template is None:
+            template = _find_installed(program)
+        if "{deck}" not in template:
+            raise ConfigurationError(
+                f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
+        try:
+            executable, *arguments = shlex.split(template)
         except ValueError as error:
             raise ConfigurationError(
                 f"--{program} {template!r}: cannot be split into words ({error})"
             ) from None
-        if not any("{deck}" in word for word in split):
-            raise ConfigurationError(
-                f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
-            )
-        executable, *arguments = split
-        if (
-            "/" in executable
-        ):  # The path is made absolute because the program is started in another folder.
+        if "/" in executable:
+            # The path is made absolute because the program is started in another folder.
             executable = str(Path(executable).absolute())
         threads = str(self.threads)
         return [
@@ -102,14 +104,14 @@ class Commands(NamedTuple):
         return ""
 
 
-def _find_installed(program: str) -> list[str]:
-    """Return the path of a program of the installation, with its arguments; raise ConfigurationError without one."""
+def _find_installed(program: str) -> str:
+    """Return the command of a program of the installation; raise ConfigurationError without one."""
     home = os.environ.get(_HOME, "")
     names, arguments = _PROGRAMS[program]
     for name in names:
         path = Path(home, name)
         if home and path.is_file():
-            return [str(path.resolve()), *arguments.split()]
+            return f"{shlex.quote(str(path.resolve()))} {arguments}"
     raise ConfigurationError(
         f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
     )
@@ -248,16 +250,13 @@ class Solver:
 
     def ended_well(self, number: int) -> bool:
         """Return True if the listing of a leg reports its normal end."""
-        return b"NORMAL TERMINATION" in _read_tail(self.file(number, ".out"))
+        return "NORMAL TERMINATION" in self._read_end(number, ".out")
 
     def took(self, number: int) -> tuple[int | None, float | None]:
         """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
-        listing = _read_tail(self.file(number, ".out"))
-        cycles, seconds = _CYCLES.findall(listing), _TOTAL.findall(listing)
-        return (
-            int(cycles[-1]) if cycles else None,
-            float(seconds[-1]) if seconds else None,
-        )
+        path = str(self.file(number, ".out"))
+        timing = find_radioss_timing(path, read_tail(path, _TAIL_SIZE))
+        return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
         """Return True if a leg, or the starter (0), has left complete restarts of all domains.
@@ -265,57 +264,49 @@ class Solver:
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
         """
-        of_starter, restarts = self._list_restarts(0), self._list_restarts(number)
+        of_starter = self._list_restarts(0)
         sizes = {_get_domain(path): path.stat().st_size for path in of_starter}
+        restarts = self._list_restarts(number)
         if not sizes or not sizes.keys() <= {_get_domain(path) for path in restarts}:
             return False
         has_names = all(_has_its_name(path) for path in of_starter)
         for path in restarts:
             least_size = max(_WHOLE * sizes.get(_get_domain(path), 1), 1)
-            if path.stat().st_size < least_size:
-                return False
-            if has_names and not _has_its_name(path):
+            is_named = _has_its_name(path) or not has_names
+            if path.stat().st_size < least_size or not is_named:
                 return False
         return True
 
-    def came_to(self, number: int, end: float) -> bool:
-        """Return True if the history of a leg has a state at or after a time [time]."""
+    def read_times(self, number: int) -> Samples:
+        """Return the times of the states in the history of a leg [time]; none if it cannot be read."""
         path = self.history(number)
         try:
-            times = TimeHistory(path.read_bytes(), str(path)).time
+            return TimeHistory(path.read_bytes(), str(path)).time
         except (FormatError, OSError):
-            return False
-        return bool(times.size) and float(times[-1]) >= end
+            return np.empty(0)
 
     def started_well(self) -> bool:
         """Return True if the starter has ended without an error and left a complete restart."""
-        return self.whole(0) and not _STARTER_ERROR.search(
-            _read_tail(self.file(0, ".out"))
-        )
+        has_error = re.search(_STARTER_ERROR, self._read_end(0, ".out"))
+        return self.whole(0) and not has_error
 
     def last_words(self, number: int) -> str:
         """Return in one line the errors that the solver reported, or else the last lines that it printed."""
-        listing = _read_lines(self.file(number, ".out"), _LISTING_SIZE)
-        lines: list[str] = []
-        for row, line in enumerate(listing):
-            if _ERROR in line:
-                lines += listing[row : row + _ERROR_LINES]
-        has_errors = bool(lines)
-        if not has_errors:
-            lines = _read_lines(self.file(number, ".log")) or _read_lines(
-                self.file(number, ".out")
-            )
-        texts = [" ".join(line.split()) for line in lines if line.strip(" -*")]
-        texts = texts[:_MOST_LINES] if has_errors else texts[-_MOST_LINES:]
+        listing = self._read_end(number, ".out", _LISTING_SIZE).splitlines()
+        rows = [row for row, line in enumerate(listing) if _ERROR in line]
+        errors = [line for row in rows for line in listing[row : row + _ERROR_LINES]]
+        printed = self._read_end(number, ".log").splitlines() or listing
+        lines = [line for line in errors or printed if line.strip(" -*")]
+        lines = lines[:_MOST_LINES] if errors else lines[-_MOST_LINES:]
+        text = " | ".join(" ".join(line.split()) for line in lines)
         ended = f"ended by signal {self._signal}; " if self._signal else ""
-        return ended + (make_printable(" | ".join(texts)) or "nothing was printed")
+        return ended + (make_printable(text) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
         """Remove all restarts except those of these legs and of the starter."""
-        for path in self.folder.glob(f"{self.name}_[0-9][0-9][0-9][0-9]_*.rst"):
-            number = int(path.name[len(self.name) + 1 :][:4])
-            if number and number not in numbers:
-                path.unlink(missing_ok=True)
+        for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
+            for path in self._list_restarts(number):
+                path.unlink()
 
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
@@ -335,6 +326,10 @@ class Solver:
                 "make room, then --resume"
             )
 
+    def _read_end(self, number: int, suffix: str, size: int = _TAIL_SIZE) -> str:
+        """Return the last bytes of a file of a leg as text; "" if it is missing."""
+        return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
+
     def _list_restarts(self, number: int) -> list[Path]:
         return list(self.folder.glob(f"{self.name}_{number:04d}_*.rst"))
 
@@ -347,18 +342,6 @@ def _get_domain(restart: Path) -> str:
 def _has_its_name(restart: Path) -> bool:
     with restart.open("rb") as stream:
         return stream.read(len(restart.name)) == restart.name.encode()
-
-
-def _read_tail(path: Path, size: int = _TAIL_SIZE) -> bytes:
-    with suppress(OSError), path.open("rb") as stream:
-        stream.seek(max(path.stat().st_size - size, 0))
-        return stream.read()
-    return b""
-
-
-def _read_lines(path: Path, size: int = _TAIL_SIZE) -> list[str]:
-    """Return the last lines of a file; no lines if it is missing."""
-    return _read_tail(path, size).decode("latin-1").splitlines()
 
 
 def _raise_stack_limit() -> None:

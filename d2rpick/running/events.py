@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
 
 from d2rpick.flight.window import FEWEST
-from d2rpick.running.evidence import GrowingEvidence, highest_energy, range_of_energy
+from d2rpick.running.evidence import GrowingEvidence, highest_energy
+from d2rpick.running.inner_motion import check_wait
 from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
@@ -17,6 +20,10 @@ if TYPE_CHECKING:
 
     # Events of past flights, keyed by the start of the flight and the time at which it was seen.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
+
+# tr is good if the internal energy is at least this far from its minimum within one wait, as a share of its range.
+# In computed runs a tr in a trough kept half of the energy that td should have, a tr at a peak at least 0.9 of it.
+_HIGH: Final = 0.75
 
 
 class Event(NamedTuple):
@@ -48,17 +55,20 @@ def find_events(
     RangeError
         If a given wait is too short.
     """
-    flights = evidence.flights(motion.needed)
+    flights = evidence.flights(motion.wait)
     rigid_times = evidence.rigid_times()
     history = evidence.history
     if decided is None:
         decided = {}
     events: list[Event] = []
     for flight in flights:
-        events += _describe_flight(history, motion, flight, decided)
+        if flight.wait.source == "given":
+            longest = motion.longest(flight.seen)
+            check_wait(flight.wait.time, longest, ", ".join(history.source))
+        events += _describe_flight(history, flight, decided)
     events = [event for event in events if not _is_rigid(event.tr, rigid_times)]
     if history.time.size and not (flights and flights[0].start <= history.time[0]):
-        push = evidence.contact_after(float(history.time[0]), 1)
+        push = evidence.find_contact(fewest=1)
         if push is not None:
             events.append(Event("load", push, push, "a force acts"))
     events += _describe_rigid_times(history, rigid_times)
@@ -90,16 +100,13 @@ def _describe_rigid_times(
 
 
 def _describe_flight(
-    history: History, motion: InnerMotion, flight: Quiet, decided: Decided
+    history: History, flight: Quiet, decided: Decided
 ) -> Iterator[Event]:
     """Yield the events of a flight: its start, the advised switch, and its contact."""
     key = (flight.start, flight.seen)
     events = decided.get(key)
     if events is None:
-        events = (
-            _describe_start(motion, flight),
-            *_suggest_switch(history, motion, flight),
-        )
+        events = (_describe_start(flight), *_suggest_switch(history, flight))
     if flight.end is not None or any(event.tr is not None for event in events):
         decided[key] = events
     yield from events
@@ -110,64 +117,60 @@ def _describe_flight(
         yield Event("contact", flight.end, flight.end, message)
 
 
-def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
+def _describe_start(flight: Quiet) -> Event:
     """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
     quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
-    wait = motion.wait(flight.start, flight.seen)
-    reason = (
-        f"required force-free time {flight.wait:.4g}: {wait.reason}" if wait else ""
-    )
     landing = "landing time unknown"
     if flight.level is not None:
         landing = f"on level ground it lands at about {flight.level:.4g}"
-    evidence = (
-        f"{quantity} is constant within {flight.left:.1e} of its maximum"
-        f" for {flight.seen - flight.start:.4g}"
+    message = (
+        f"{quantity} is constant within {flight.left:.1e} of its maximum for {flight.seen - flight.start:.4g}; "
+        f"required force-free time {flight.wait.time:.4g}: {flight.wait.reason}; {landing}"
     )
-    message = "; ".join(filter(None, (evidence, reason, landing)))
-    return Event("flight", flight.start, flight.seen, message, flight.wait, flight.left)
+    return Event(
+        "flight", flight.start, flight.seen, message, flight.wait.time, flight.left
+    )
 
 
-def _suggest_switch(
-    history: History, motion: InnerMotion, flight: Quiet
-) -> Iterator[Event]:
-    """Advise when to switch in a flight."""
-    wait = motion.wait(flight.start, flight.seen)
-    if wait and wait.source == "at-rest":
+def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
+    """Advise when to switch in a flight: at once if nothing vibrates, else while the internal energy is high.
+
+    If it is low for one wait, the time of its maximum is advised.
+    """
+    if flight.wait.source == "at-rest":
         message = "switch now: nothing vibrates, so any tr is right, and the earliest keeps the parts rigid for longest"
-        now = flight.seen
-        yield Event("switch", now, now, message, flight.wait, tr=now)
-    else:
-        yield from _suggest_switch_by_energy(history, flight)
-
-
-def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise a switch while the internal energy is high; after one more wait, advise the time of its maximum."""
-    last = flight.seen + flight.wait
+        yield _advise(flight.seen, flight.seen, message, flight)
+        return
+    last = flight.seen + flight.wait.time
+    end = np.inf if flight.end is None else flight.end
     times, energies = history.between(flight.seen, last)
     for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
-        low, high, enough = range_of_energy(history, now, flight.wait)
-        level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
-        if flight.end is not None and now >= flight.end:
+        if now >= end:
             return
-        if energy >= enough:
+        energies_so_far = history.between(now - flight.wait.time, now)[1]
+        low, high = float(energies_so_far.min()), float(energies_so_far.max())
+        level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
+        if energy >= low + _HIGH * (high - low):
             message = f"switch now: {level}{_warn_of_swing(history, flight, now)}"
-            yield Event("switch", now, now, message, flight.wait, tr=now)
+            yield _advise(now, now, message, flight)
             return
         if now == flight.seen:
             message = f"not yet: {level}; waiting until {last:.6g} for its maximum"
-            yield Event("later", last, now, message, flight.wait)
-    is_over = flight.end is not None and flight.end <= last
-    if history.time[-1] > last and not is_over:
+            yield Event("later", last, now, message, flight.wait.time)
+    later_times = history.between(last, history.time[-1])[0]
+    if history.time[-1] > last < end:
         tr = highest_energy(history, flight.seen, last)
-        now = float(history.between(last, history.time[-1])[0][0])
         message = (
             f"the internal energy was highest at {tr:.6g}: restart from an earlier state to switch there"
             f"{_warn_of_swing(history, flight, tr)}"
         )
-        yield Event("switch", tr, now, message, flight.wait, tr=tr)
+        yield _advise(tr, float(later_times[0]), message, flight)
+
+
+def _advise(tr: float, seen: float, message: str, flight: Quiet) -> Event:
+    return Event("switch", tr, seen, message, flight.wait.time, tr=tr)
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:

@@ -19,16 +19,14 @@ from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.running.witness import Needed
 
-# tr is good if the internal energy is at least this far from its minimum within one wait, as a share of its range.
-# In computed runs a tr in a trough kept half of the energy that td should have, a tr at a peak at least 0.9 of it.
-_HIGH: Final = 0.75
 # Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
@@ -38,14 +36,16 @@ class GrowingEvidence:
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
-        self._of_parts: list[GrowingWitness] = []
-        self._of_model: list[GrowingWitness] = []  # has at most one item
-        # The evidence that still grows for each set of parts, keyed by the indices of the parts.
-        self._going_on: dict[tuple[int, ...], GrowingWitness] = {}
+        self._witnesses: list[GrowingWitness] = []
+        # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
+        self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        # For each state, the parts that have moved so far, and whether they have the complete momentum of the model.
-        self._moved, self._complete = GrowingColumn(), GrowingColumn()
+        self._has_moved: NDArray[np.bool_] = np.zeros((1, 1), np.bool_)
+        # For each state, True if the part momenta add up to the momentum of the model.
+        self._complete = GrowingColumn()
         self._largest_momentum = 0.0
+        # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
+        self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
     @property
     def history(self) -> History:
@@ -55,22 +55,24 @@ class GrowingEvidence:
     @property
     def witnesses(self) -> list[GrowingWitness]:
         """Evidence of each set of parts, and at last of the model if it has a momentum or contact energy."""
-        return [*self._of_parts, *self._of_model]
+        return sorted(self._witnesses, key=_is_of_model)
 
     def take(self, states: History) -> None:
         """Append states, which must have the same quantities as the states so far."""
         self._record.add(states)
+        balance = states.balance
         of_model = find_momenta(states, of_parts=False)
         of_parts = find_momenta(states, of_parts=True)
-        balance = states.balance
-        if of_parts is not None:
+        self.moving = []
+        if of_parts is not None and of_parts.time.size:
             self._add_parts(of_parts, of_model, balance)
-        self._add_model(of_model, balance)
-        contact_precision = balance.precision if balance else EXACT
-        for witness in self.witnesses:
-            momenta = of_model if witness.parts is None else of_parts
-            precision = momenta.precision if momenta else EXACT
-            witness.follow(precision, contact_precision)
+        if of_model is not None:
+            columns = _make_columns(of_model.time, of_model.of((0,)), balance)
+            self._add((0,), None, columns, (of_model, balance))
+        elif balance is not None and balance.sliding is not None:
+            motionless = np.zeros((balance.time.size, 3))
+            columns = _make_columns(balance.time, motionless, balance)
+            self._add((), None, columns, (None, balance))
 
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
@@ -85,77 +87,55 @@ class GrowingEvidence:
         if of_model is not None:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
-        origin = self._complete.size
-        moved = self._add_moved(momenta)
         self._complete.add(are_complete)
-        part_numbers = range(len(momenta.parts))
-        for stretch in find_stretches(are_complete):
-            if stretch.start > 0:
-                self._going_on.clear()
-            for members in dict.fromkeys(_list_sets(momenta)):
-                if members not in self._going_on:
-                    self._begin(members, momenta, origin + stretch.start)
-                other_parts = sorted({*part_numbers} - {*members})
-                self._going_on[members].add(
-                    time=momenta.time[stretch],
-                    momentum=momenta.of(members)[stretch],
-                    contact=_get_contact_energy(balance, momenta.time, stretch),
-                    alone=np.asarray(~moved[stretch][:, other_parts].any(axis=1)),
-                )
-        if are_complete.size and not are_complete[-1]:
-            self._going_on.clear()
+        has_moved = self._find_moved(momenta)
+        moves = has_moved & are_complete[:, np.newaxis]
+        changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
+        for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
+            numbers = tuple(np.flatnonzero(moves[begin]).tolist())
+            self.moving.append((slice(begin, end), numbers))
+        for members in dict.fromkeys(_list_sets(momenta)):
+            columns = _make_columns(momenta.time, momenta.of(members), balance)
+            # Contact energy shows collisions between bodies, which do not change the total momentum.
+            # Once other parts move, it shows their contacts too and is no longer used.
+            other_parts = sorted({*range(len(momenta.parts))} - {*members})
+            columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
+            parts = tuple(momenta.parts[number] for number in members)
+            self._add(members, parts, columns, (momenta, balance), are_complete)
 
-    def _begin(self, members: tuple[int, ...], momenta: Momenta, origin: int) -> None:
-        """Begin to collect evidence for a set of parts at a state."""
-        assert momenta.parts is not None
-        parts = tuple(momenta.parts[number] for number in members)
-        witness = GrowingWitness(members, parts, origin)
-        self._going_on[members] = witness
-        self._of_parts.append(witness)
+    def _add(
+        self,
+        members: tuple[int, ...],
+        parts: tuple[Part, ...] | None,
+        columns: Samples,
+        written: tuple[Momenta | None, Balance | None],
+        is_used: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Append states to the evidence of a set of parts, which begins anew after states that are not used.
 
-    def _add_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Record which parts have changed their momentum by each of these states, and return that, shape (k, parts)."""
-        if self._first_momenta is None:
-            self._first_momenta = momenta.values[0]
-        moved = (momenta.values != self._first_momenta).any(axis=2)
-        if self._moved.size:
-            moved[0] |= self._moved.rows[-1]
-        self._moved.add(np.logical_or.accumulate(moved, axis=0))
-        return self._moved.rows[-len(moved) :]
-
-    def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
-        """Split the last ``count`` states wherever a part begins to move or momentum begins to be missing.
-
-        Gives for each piece its states, the numbers of the parts that move, and whether the momenta are complete.
+        ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
-        states = np.column_stack(
-            [self._moved.rows[-count:], self._complete.rows[-count:]]
-        )
-        changes = 1 + np.flatnonzero((states[1:] != states[:-1]).any(axis=1))
-        for begin, end in pairwise([0, *changes.tolist(), count]):
-            *moved, are_complete = states[begin].tolist()
-            moving = tuple(number for number, moves in enumerate(moved) if moves)
-            yield slice(begin, end), moving, are_complete
+        key = None if parts is None else members
+        used = np.ones(len(columns), np.bool_) if is_used is None else is_used
+        precisions = [table.precision if table else EXACT for table in written]
+        for stretch in find_stretches(used):
+            if stretch.start > 0 or key not in self._going_on:
+                self._going_on[key] = GrowingWitness(members, parts)
+                self._witnesses.append(self._going_on[key])
+            self._going_on[key].add(columns[stretch], *precisions)
+        if used.size and not used[-1]:
+            self._going_on.pop(key, None)
 
-    def _add_model(self, momenta: Momenta | None, balance: Balance | None) -> None:
-        """Append the momentum and contact energy of the whole model to its evidence, if one of them is written."""
-        members: tuple[int, ...] = ()
-        momentum: Samples | None = None
-        if momenta is not None:
-            members = (0,)
-            time, momentum = momenta.time, momenta.of(members)
-        elif balance is not None and balance.sliding is not None:
-            time = balance.time
-        else:
-            return
-        if not self._of_model:
-            self._of_model.append(GrowingWitness(members, None, 0))
-        self._of_model[0].add(
-            time=time,
-            momentum=momentum,
-            contact=_get_contact_energy(balance, time),
-            alone=np.ones(time.size, np.bool_),
-        )
+    def _find_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
+        """Return which parts have changed their momentum by each of these states, shape (k, parts)."""
+        if self._first_momenta is None:
+            self._first_momenta = momenta.values[:1]
+            self._has_moved = np.zeros((1, momenta.values.shape[1]), np.bool_)
+        changed = (momenta.values != self._first_momenta).any(axis=2)
+        changes = np.concatenate([self._has_moved, changed])
+        has_moved = np.logical_or.accumulate(changes, axis=0)[1:]
+        self._has_moved = has_moved[-1:]
+        return has_moved
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
         """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
@@ -163,7 +143,7 @@ class GrowingEvidence:
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         for witness in self.witnesses:
-            witness.look(needed, self._find_gravity)
+            witness.examine(needed, self._find_gravity)
         candidates = [
             (flight, float(witness.time[-1]))
             for witness in self.witnesses
@@ -191,57 +171,38 @@ class GrowingEvidence:
             return 0.0
         momenta = find_momenta(history, of_parts=witness.parts is not None)
         assert momenta is not None
-        is_used = np.zeros(momenta.time.size, np.bool_)
-        for begin, end in ((0, first), (first, last)):
-            count = min(end - begin + 1, _GRAVITY_STATES)
-            states = np.linspace(begin, end, count).round().astype(np.intp)
-            is_used[witness.origin + states] = True
-        so_far = select_states(momenta, is_used)
-        if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0
-        start = int(np.searchsorted(so_far.time, witness.time[first]))
+        times = witness.time[[0, first, last]]
+        begin, start, end = np.searchsorted(momenta.time, times).tolist()
+        states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
+        so_far = select_states(momenta, np.array(states, np.intp))
         laws = get_laws_of(so_far, witness.members, history.balance)
-        return laws.gravity(start, so_far.time.size - 1)
+        return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
         """Return when the force-free time that lasts up to a time began; without states, return that time itself."""
         starts = [time]
-        for witness in self.witnesses:
+        for witness in self._witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
             if state >= 0 and time <= witness.time[-1]:
                 starts.append(float(witness.time[witness.free[state]]))
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return all force-free intervals that ended after ``since`` and were shorter than the wait."""
-        if not self.witnesses:
-            return ()
-        going_on = [
-            witness for witness in self.witnesses if witness in self._going_on.values()
-        ]
-        witness = going_on[0] if going_on else self.witnesses[-1]
-        time = witness.time
-        starts = time[np.array(witness.free, np.intp)]
-        is_over = starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2
-        ends = 1 + np.flatnonzero(is_over & (time[1:] > since))
-        pauses = [(float(starts[end - 1]), float(time[end])) for end in ends.tolist()]
-        flight_ends = {flight.end for flight in witness.flights}
-        return tuple(pause for pause in pauses if pause[1] not in flight_ends)
+        """Return all force-free times that ended after ``since``, before they were seen as flights."""
+        for witness in sorted(self._going_on.values(), key=_is_of_model):
+            return tuple(pause for pause in witness.pauses if pause[1] > since)
+        return ()
 
-    def contact_after(self, start: float, least: int = FEWEST) -> float | None:
-        """Return the first state after ``start`` at which a force acts; None if no force does [time].
+    def find_contact(self, fewest: int = FEWEST) -> float | None:
+        """Return the first state at which a force acts [time]; None if none does. The record begins without a force.
 
-        No force acts at ``start``, as in a rigid leg that begins in flight.  A witness is used if it has at least
-        ``least`` states from there on.
+        A witness is used if it has at least ``fewest`` states from the first one of the record on.
         """
-        begin = max(start, float(self.history.time[0]))
         for witness in self.witnesses:
-            first = int(np.searchsorted(witness.time, start))
-            state_count = witness.time.size
-            if witness.time[0] <= begin and first + least <= state_count:
-                last = witness.last_without(first)
-                at_end = last == state_count - 1
-                return None if at_end else float(witness.time[last + 1])
+            begins = witness.time[0] <= self.history.time[0]
+            if begins and witness.time.size >= fewest:
+                contacts = witness.time[np.array(witness.free) > 0].tolist()
+                return contacts[0] if contacts else None
         return None
 
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
@@ -270,15 +231,6 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def range_of_energy(
-    history: History, now: float, wait: float
-) -> tuple[float, float, float]:
-    """Return the lowest and highest internal energy within the last wait, and the lowest energy that is good for tr."""
-    energy = history.between(now - wait, now)[1]
-    low, high = float(energy.min()), float(energy.max())
-    return low, high, low + _HIGH * (high - low)
-
-
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
     """Return a flight whose own evidence ended at ``last_time`` with the end that other evidence shows."""
     if flight.end is not None:
@@ -292,33 +244,37 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
     return flight._replace(end=next(ends, None))
 
 
-def _get_contact_energy(
-    balance: Balance | None, time: Samples, states: slice = slice(None)
-) -> Samples | None:
-    """Return the contact energy at the ``states`` of these times; None if the file does not contain it there."""
-    if balance is None or balance.sliding is None or balance.time.size != time.size:
-        return None
-    return balance.sliding[states]
+def _is_of_model(witness: GrowingWitness) -> bool:
+    """Return True if evidence is of the whole model, which is used after that of parts."""
+    return witness.parts is None
 
 
-def _list_sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts that may fly together: the chosen parts, these with all connected parts, and all parts.
+def _sample_states(first: int, last: int) -> Samples:
+    """Return the states from ``first`` to ``last``, or some of them if there are too many."""
+    return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
+
+
+def _make_columns(time: Samples, momentum: Samples, balance: Balance | None) -> Samples:
+    """Return time, contact energy and momentum as columns (k, 5). The energy is NaN if it is not written."""
+    contact = np.full(time.size, np.nan)
+    if (
+        balance is not None
+        and balance.sliding is not None
+        and balance.time.size == time.size
+    ):
+        contact = balance.sliding
+    return np.column_stack([time, contact, momentum])
+
+
+def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
+    """Return the sets of parts that may fly together: the chosen parts with all connected parts, and all parts.
 
     Parts are given by their numbers in the momenta.
     """
     assert momenta.parts is not None
-    chosen = tuple(momenta.flying or momenta.chosen)
-    yield chosen
-    number_of_part = {part.id: number for number, part in enumerate(momenta.parts)}
-    chosen_ids = {momenta.parts[number].id for number in chosen}
-    joined_ids = {
-        part_id
-        for body in momenta.surroundings.bodies()
-        if chosen_ids & {*body}
-        for part_id in body
-    }
-    joined = {
-        number_of_part[part_id] for part_id in joined_ids if part_id in number_of_part
-    }
-    yield tuple(sorted({*chosen, *joined}))
-    yield tuple(range(momenta.values.shape[1]))
+    ids = [part.id for part in momenta.parts]
+    joined = {ids[number] for number in momenta.flying or momenta.chosen}
+    bodies = [{*body} for body in momenta.surroundings.bodies()]
+    joined = joined.union(*(body for body in bodies if body & joined))
+    body_numbers = tuple(number for number, part in enumerate(ids) if part in joined)
+    return body_numbers, tuple(range(len(ids)))

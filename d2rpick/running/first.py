@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
-from d2rpick.deck.engine_files import write_bodies_off, write_numbers, write_step_limit
+from d2rpick.deck.engine_files import EngineFile, write_engine_lines
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.pieces import find_inner_period
 from d2rpick.deck.printed_card import (
     PHYSICS,
     PrintedCard,
@@ -24,14 +23,19 @@ from d2rpick.deck.printed_card import (
 from d2rpick.deck.radioss_bodies import find_bodies
 from d2rpick.deck.radioss_deck import find_bodies_kept_off
 from d2rpick.deck.radioss_run import find_parts_off, read_run
+from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
+from d2rpick.deck.sensor_cards import (
+    write_any_of,
+    write_force_sensor,
+    write_sensor_of_sensors,
+    write_time_sensor,
+)
 from d2rpick.deck.switch_sets import (
     Waiting,
-    write_deformable_lines,
-    write_header,
-    write_rigid_lines,
+    write_set_pair,
 )
-from d2rpick.running.checks import NO_CONTACT, contacts_of, refuse_held
+from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
@@ -39,7 +43,6 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_bodies import SwitchedBodies
-    from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
@@ -133,19 +136,16 @@ def first_card(
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     """Return the given wait, or half of the longest period in the deck; raise ArgumentError without either."""
+    of_deck = wait_of_deck(inventory)
     if given is not None:
-        check_wait(given, wait_of_deck(inventory), path)
+        check_wait(given, of_deck, path)
         return Wait(given, "given", "as given")
-    period = find_inner_period(inventory)
-    if period is None:
+    if of_deck is None:
         raise ArgumentError(
             f"`wait` cannot be derived from {path} (no masses on linear springs found); give the force-free time that"
             " marks a flight: more than half of the longest natural period of the parts"
         )
-    half = float(f"{period.time / 2:.3g}")
-    return Wait(
-        half, "deck", f"half of the period {period.time:.3g} of {period.reason}"
-    )
+    return of_deck._replace(time=float(f"{of_deck.time:.3g}"))
 
 
 # Radioss.
@@ -164,11 +164,13 @@ def _make_radioss_card(
         raise DeckError(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
         )
-    _refuse_loads(run.starter)
-    contacts = list(contacts_of(run.starter))
+    for load in run.starter.named(*_LOADS):
+        raise DeckError(f"{load.at}: /{load.name} {_UNSEEN}")
+    contacts = list_forces(run.starter)
     if not contacts:
         raise DeckError(f"{path}: {NO_CONTACT}")
-    at_rest = after is None and _falls_from_rest(run, inventory, parts)
+    starts_moving = run.starter.named("INIVEL") or any(leg.starts for leg in run.legs)
+    at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
     first_switch = wait.time if after is None else max(after, wait.time)
     sensors = _write_sensors(contacts, wait.time, first_switch, bodies.sensor)
     largest_step = float(f"{wait.time / _STEPS_PER_WAIT:.2g}")
@@ -184,23 +186,6 @@ def _make_radioss_card(
     return First(card, wait, notes)
 
 
-def _refuse_loads(starter: Starter) -> None:
-    """Raise DeckError if a load acts without a contact."""
-    for card in starter.named(*_LOADS):
-        raise DeckError(f"{card.at}: /{card.name} {_UNSEEN}")
-
-
-def _falls_from_rest(
-    run: RadiossRun, inventory: Inventory, parts: Collection[int]
-) -> bool:
-    """Return True if the parts are initially at rest and unsupported, and gravity acts on them."""
-    if run.starter is None or run.starter.named("INIVEL"):
-        return False
-    if any(leg.starts for leg in run.legs):
-        return False
-    return bool(inventory.boundary.gravity) and bool(parts)
-
-
 class _Sensors(NamedTuple):
     """The sensor cards, the id of the sensor that detects a contact force, and that of the sensor for a flight."""
 
@@ -213,24 +198,19 @@ def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
     """Write a sensor that detects a contact force within the wait, and a sensor that detects a flight."""
-    cards: list[str] = []
-    for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
-        row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-        cards.append(
-            f"/SENSOR/{kind}/{sensor}\nforce, or shortly after\n{write_number(wait, 20):>20}\n{row}\n"
-        )
-    any_force, next_id = first_id, first_id + len(contacts)
-    for sensor in range(first_id + 1, first_id + len(contacts)):
-        cards.append(
-            f"/SENSOR/OR/{next_id}\nany force\n{0:20d}\n{any_force:10d}{sensor:10d}\n"
-        )
-        any_force, next_id = next_id, next_id + 1
-    no_force, late_enough, flight = next_id, next_id + 1, next_id + 2
-    start = f"{write_number(first_switch, 20):>20}"
-    cards += [
-        f"/SENSOR/NOT/{no_force}\nno force\n{0:20d}\n{any_force:10d}\n",
-        f"/SENSOR/TIME/{late_enough}\nfrom then on\n{start}\n",
-        f"/SENSOR/AND/{flight}\nflight\n{0:20d}\n{no_force:10d}{late_enough:10d}\n",
+    forces = [
+        write_force_sensor(number, *contact, wait)
+        for number, contact in enumerate(contacts, start=first_id)
+    ]
+    ids = range(first_id, first_id + len(contacts))
+    combined, any_force = write_any_of(ids, "any force")
+    no_force, late_enough, flight = range(any_force + 1, any_force + 4)
+    cards = [
+        *forces,
+        combined,
+        write_sensor_of_sensors("NOT", no_force, "no force", any_force),
+        write_time_sensor(late_enough, "from then on", first_switch),
+        write_sensor_of_sensors("AND", flight, "flight", no_force, late_enough),
     ]
     return _Sensors("".join(cards), any_force, flight)
 
@@ -245,26 +225,18 @@ def _write_legs(
 ) -> dict[str, str]:
     """Write the engine files, alternately deformable and rigid. The first one is rigid if the parts fall from rest."""
     (leg,) = run.legs
-    other_nodes = tuple(
+    other_nodes = [
         node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
-    )
+    ]
     leg_count = _MOST_LEGS - at_rest
     files = {}
     for number in range(1, leg_count + 1):
         rigid = number % 2 == at_rest
-        lines = [f"/RUN/{leg.name}/{number}", f"{leg.stop.value!r:>20}"]
+        file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
+        lines = [*write_engine_lines(file, leg.name, bodies.nodes, other_nodes)]
         if number < leg_count:
             sensor = sensors.contact if rigid else sensors.flight
             lines += ["/STOP/LSENSOR", str(sensor), "0 0 0 0 0 0"]
-        if rigid:
-            lines += [
-                "/RBODY/ON",
-                *write_numbers(bodies.nodes),
-                *write_step_limit(largest_step),
-            ]
-            lines += write_bodies_off(other_nodes)
-        else:
-            lines += write_bodies_off((*bodies.nodes, *other_nodes))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     return files
 
@@ -302,22 +274,17 @@ def _make_ls_dyna_card(
         notes.append("TIME1 is 0: if you know the end of the load, give it (--after).")
     delay = wait.time / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
-    lines += write_header(
-        rigid_set,
-        write_number(after or 0.0),
+    lines += write_set_pair(
+        printing.swset,
+        (write_number(after or 0.0), "0.0"),
         write_number(delay),
-        (len(part_ids), 0),
-        Waiting(2, contact, delay, deformable_set, 1),
+        part_ids,
+        printing,
+        waits=(
+            Waiting(2, contact, delay, deformable_set, 1),
+            Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
+        ),
     )
-    lines += write_rigid_lines(part_ids, printing)
-    lines += write_header(
-        deformable_set,
-        "0.0",
-        "0.0",
-        (0, len(part_ids)),
-        Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
-    )
-    lines += write_deformable_lines(part_ids)
     text = "\n".join(lines) + "\n"
     return First(PrintedCard(text, (), {"switches.k": text}), wait, tuple(notes))
 

@@ -17,7 +17,7 @@ from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
 from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.record import GrowingColumn
+from d2rpick.running.record import GrowingColumn, find_momenta
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,22 +65,14 @@ class Wait(NamedTuple):
 class _HalfPeriod(NamedTuple):
     """Half a period of an inner motion, from ``begin`` to ``end``; it was detected at the time ``seen_at`` [time].
 
-    ``half`` is half of its period [time], ``strength`` its mean change by time, 0 if that is less than a swing.
+    ``half`` is half of its period [time], ``strength`` its mean change by time.
     """
 
     begin: float
     end: float
     seen_at: float
-    half: float
-    strength: float
-
-
-class _OngoingSwing(NamedTuple):
-    """An unfinished oscillation: its mean rate of change, its duration, and the longest half period before it."""
-
-    strength: float
-    duration: float
-    longest_half_before: float
+    half: float = 0.0
+    strength: float = 0.0
 
 
 class _Motion:
@@ -92,25 +84,17 @@ class _Motion:
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
         self.has_free_swing = False  # True after an oscillation without a push
-        self.swings: list[_HalfPeriod] = []
-        self._columns = {
-            name: GrowingColumn() for name in ("time", "values", "least_swing")
-        }
+        # The first half period is empty: it ends when the motion is first seen.
+        self._swings: list[_HalfPeriod] = []
+        self._columns = GrowingColumn()  # time, value, and least change that is a swing
         self._lowest, self._highest = np.inf, -np.inf
-        # State at the last turning point (None before any motion), and at the extreme value since then.
-        self._turn: int | None = None
-        self._extreme, self._rising = 0, False
-        self._first_moved: float | None = None  # time of the first motion [time]
+        # States at the last turning point and at the extreme value since then, and 1 if values rise, -1 if they fall.
+        self._turn, self._extreme, self._sign = 0, 0, 1
 
-    @property
-    def begins(self) -> float:
-        """Time of the first state [time]."""
-        return float(self._columns["time"].rows[0])
-
-    @property
-    def ends(self) -> float:
-        """Time of the last state [time]."""
-        return float(self._columns["time"].rows[-1])
+    def covers(self, now: float) -> bool:
+        """Return True if a time is between the first and the last state."""
+        time = self._columns.rows[:, 0]
+        return bool(time[0] <= now <= time[-1])
 
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
@@ -120,88 +104,67 @@ class _Motion:
         highs = np.maximum(np.maximum.accumulate(values), self._highest)
         self._lowest, self._highest = float(lows[-1]), float(highs[-1])
         limits = np.maximum(_SWING * (highs - lows), least_swing)
-        begin = self._columns["time"].size
-        self._columns["time"].add(time)
-        self._columns["values"].add(values)
-        self._columns["least_swing"].add(limits)
-        all_values = self._columns["values"].rows
-        skipped = 0
-        if self._turn is None:
+        first = self._columns.size
+        self._columns.add(np.column_stack([time, values, limits]))
+        rows = self._columns.rows
+        if not self._swings:
             moved = np.flatnonzero(highs - lows > limits)
             if not moved.size:
                 return
-            skipped = int(moved[0])
-            state = begin + skipped
-            self._first_moved = float(time[skipped])
-            self._turn = _find_last_extreme(all_values[: state + 1])
-            self._extreme = state
-            self._rising = bool(all_values[state] > all_values[self._turn])
-        new_values = values[skipped:].tolist()
-        new_limits = limits[skipped:].tolist()
-        for state, (value, limit) in enumerate(
-            zip(new_values, new_limits, strict=True), start=begin + skipped
-        ):
-            swing = self._follow(state, value, limit, float(all_values[self._extreme]))
-            if swing is not None:
-                yield swing
+            first += int(moved[0])
+            self._begin(first)
+        for state, (_, value, limit) in enumerate(rows[first:].tolist(), start=first):
+            beyond_extreme = self._sign * (value - rows[self._extreme, 1])
+            if beyond_extreme >= 0:
+                self._extreme = state
+            elif -beyond_extreme > limit:
+                if self._extreme - self._turn >= _FEWEST_STATES:
+                    yield self._measure(state)
+                self._turn, self._extreme = self._extreme, state
+                self._sign = -self._sign
 
-    def _follow(
-        self, state: int, value: float, least_swing: float, extreme_value: float
-    ) -> _HalfPeriod | None:
-        """Follow the motion to a state; return a half period once values have gone back by ``least_swing`` after it."""
-        goes_on = value >= extreme_value if self._rising else value <= extreme_value
-        if goes_on:
-            self._extreme = state
-            return None
-        if abs(extreme_value - value) <= least_swing:
-            return None
-        assert self._turn is not None
-        swing = None
-        if self._extreme - self._turn >= _FEWEST_STATES:
-            swing = self._measure(self._turn, self._extreme, state, least_swing)
-            self.swings.append(swing)
-        self._turn, self._extreme, self._rising = (
-            self._extreme,
-            state,
-            not self._rising,
+    def _begin(self, state: int) -> None:
+        """Begin to follow the motion, which is first seen at a state."""
+        time, values, _ = self._columns.rows[: state + 1].T
+        distance = np.abs(values - values[-1])
+        self._turn = int(np.flatnonzero(distance == distance.max())[-1])
+        self._extreme = state
+        self._sign = 1 if values[-1] > values[self._turn] else -1
+        now = float(time[-1])
+        self._swings.append(_HalfPeriod(now, now, now))
+
+    def _measure(self, state: int) -> _HalfPeriod:
+        """Measure the half period from the last turning point to the extreme value; it is detected at a later state."""
+        time, values, _ = self._columns.rows[self._turn : state + 1].T
+        end = self._extreme - self._turn
+        distance = np.abs(values[: end + 1] - values[0])
+        low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
+        high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
+        half = self._factor * float(time[high] - time[low]) / _INNER_TIME
+        begin, end_time, now = time[[0, end, -1]].tolist()
+        strength = float(distance[-1]) / half
+        self._swings.append(_HalfPeriod(begin, end_time, now, half, strength))
+        return self._swings[-1]
+
+    def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
+        """Return True if the swing that goes on is much longer than all before it, and is no rest or rotation.
+
+        The mean change by time of a rotation is below ``least_strength``.
+        """
+        swings = [swing for swing in self._swings if swing.seen_at <= now]
+        if not swings:
+            return False
+        time, values, limits = self._columns.rows.T
+        begin, state = np.searchsorted(time, [swings[-1].end, now]).tolist()
+        earlier_values = values[[begin, (begin + state) // 2]]
+        change, late_change = np.abs(values[state] - earlier_values).tolist()
+        duration = self._factor * (now - swings[-1].end)
+        longest_half = max(swing.half for swing in swings)
+        is_rest = change <= limits[state] or late_change <= limits[state] / 2
+        is_rotation = change < least_strength * duration
+        return (
+            not is_rest and not is_rotation and duration > _MUCH_LONGER * longest_half
         )
-        return swing
-
-    def _measure(
-        self, begin: int, end: int, state: int, least_swing: float
-    ) -> _HalfPeriod:
-        """Measure the half period between two states; it is detected at a third state."""
-        time = self._columns["time"].rows
-        values = self._columns["values"].rows[begin : end + 1]
-        distance = np.abs(values - values[0])
-        whole = distance[-1]
-        low = int(np.flatnonzero(distance <= _INNER * whole)[-1])
-        high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * whole))
-        inner_time = float(time[begin + high] - time[begin + low])
-        half = self._factor * inner_time / _INNER_TIME
-        strength = float(whole) / half if whole > least_swing else 0.0
-        return _HalfPeriod(
-            float(time[begin]), float(time[end]), float(time[state]), half, strength
-        )
-
-    def find_ongoing(self, now: float) -> _OngoingSwing | None:
-        """Return the unfinished oscillation ``now``; None if the motion has come to rest or is a rotation."""
-        time, values = self._columns["time"].rows, self._columns["values"].rows
-        if self._turn is None or self._first_moved is None or self._first_moved > now:
-            return None
-        state = int(np.searchsorted(time, now, side="right")) - 1
-        swings_before = [swing for swing in self.swings if swing.seen_at <= now]
-        turned_at = swings_before[-1].end if swings_before else self._first_moved
-        begin = int(np.searchsorted(time, turned_at))
-        middle = (begin + state) // 2
-        change = abs(float(values[state] - values[begin]))
-        change_of_late = abs(float(values[state] - values[middle]))
-        least_swing = float(self._columns["least_swing"].rows[state])
-        if change <= least_swing or change_of_late <= least_swing / 2:
-            return None
-        duration = self._factor * (now - turned_at)
-        longest = max((swing.half for swing in swings_before), default=0.0)
-        return _OngoingSwing(change / duration, duration, longest)
 
 
 class _Longest(NamedTuple):
@@ -211,11 +174,11 @@ class _Longest(NamedTuple):
     """
 
     since: float
-    half: float
-    strength: float
-    name: str
-    over: float
-    swing: float
+    half: float = 0.0
+    strength: float = 0.0
+    name: str = ""
+    over: float = 0.0
+    swing: float = 0.0
 
 
 class InnerMotion:
@@ -235,35 +198,39 @@ class InnerMotion:
         if before > (of_deck.time if of_deck else 0.0):
             self._least = Wait(before, "record", "as in the flight before")
         self._evidence = GrowingEvidence()
+        self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._part_motions: list[_Motion] = []
         # Motions that still continue, keyed by the indices of part and axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
-        self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._heavy: tuple[int, ...] = ()
         self._largest_speed = self._largest_energy = 0.0
+        # Time from which on the motions of parts count, no longer that of the energy [time].
+        self._parts_since = np.inf
         # Longest half periods in the order in which they became known.
-        self._longest_of_parts: list[_Longest] = []
-        self._longest_of_energy: list[_Longest] = []
+        self._longest_of_parts = [_Longest(-np.inf)]
+        self._longest_of_energy = [_Longest(-np.inf)]
 
     def take(self, states: History, evidence: GrowingEvidence) -> None:
         """Append states that the ``evidence`` already contains."""
         self._evidence = evidence
-        for momenta in states.momenta:
-            if momenta.parts is not None and momenta.masses is not None:
-                swings = sorted(
-                    self._follow_parts(momenta), key=lambda pair: pair[0].seen_at
-                )
-                for swing, motion in swings:
-                    self._learn(swing, motion)
-                break
-        for swing in self._follow_energy(states):
-            self._learn(swing, self._energy)
+        momenta = find_momenta(states, of_parts=True)
+        if momenta is not None and momenta.masses is not None:
+            swings = self._follow_parts(momenta, momenta.masses)
+            for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):
+                self._learn(swing, motion, self._longest_of_parts)
+        if states.time.size:
+            largest = np.maximum.accumulate(np.abs(states.energy))
+            largest = np.maximum(largest, self._largest_energy)
+            self._largest_energy = float(largest[-1])
+            least_swing = _AT_REST * largest
+            for swing in self._energy.add(states.time, states.energy, least_swing):
+                self._learn(swing, self._energy, self._longest_of_energy)
 
-    def _follow_parts(self, momenta: Momenta) -> Iterator[tuple[_HalfPeriod, _Motion]]:
+    def _follow_parts(
+        self, momenta: Momenta, masses: Samples
+    ) -> Iterator[tuple[_HalfPeriod, _Motion]]:
         """Follow the momenta of heavy parts relative to the centre of mass of all moving parts."""
-        masses = momenta.masses
-        assert masses is not None
-        for states, moving, complete in self._evidence.alike(momenta.time.size):
+        for states, moving in self._evidence.moving:
             members = [number for number in moving if masses[number] > 0]
             whole = float(masses[members].sum())
             heavy = tuple(
@@ -271,21 +238,23 @@ class InnerMotion:
                 for number in members
                 if _HEAVY < masses[number] / whole < 1 - _HEAVY
             )
-            if heavy != self._heavy or not complete:
+            if heavy != self._heavy:
                 self._going_on.clear()
             self._heavy = heavy
-            if not heavy or not complete:
+            if not heavy:
                 continue
+            time = momenta.time[states]
+            self._parts_since = min(self._parts_since, float(time[0]))
             velocity = momenta.values[states][:, members].sum(axis=1) / whole
             speeds = np.maximum.accumulate(np.abs(velocity).max(axis=1))
-            largest_speeds = np.maximum(speeds, self._largest_speed)
-            self._largest_speed = float(largest_speeds[-1])
+            speeds = np.maximum(speeds, self._largest_speed)
+            self._largest_speed = float(speeds[-1])
             for number in heavy:
                 relative = momenta.values[states, number] - masses[number] * velocity
-                least_swing = masses[number] * _AT_REST * largest_speeds
+                least_swing = masses[number] * _AT_REST * speeds
                 for axis, values in enumerate(relative.T):
                     motion = self._get_motion(momenta, number, axis)
-                    for swing in motion.add(momenta.time[states], values, least_swing):
+                    for swing in motion.add(time, values, least_swing):
                         yield swing, motion
 
     def _get_motion(self, momenta: Momenta, number: int, axis: int) -> _Motion:
@@ -297,132 +266,91 @@ class InnerMotion:
             self._part_motions.append(motion)
         return self._going_on[number, axis]
 
-    def _follow_energy(self, states: History) -> Iterator[_HalfPeriod]:
-        """Follow the internal energy, which oscillates at twice the rate of the deformation."""
-        if not states.time.size:
-            return
-        energies = np.maximum.accumulate(np.abs(states.energy))
-        largest = np.maximum(energies, self._largest_energy)
-        self._largest_energy = float(largest[-1])
-        yield from self._energy.add(states.time, states.energy, _AT_REST * largest)
-
-    def _learn(self, swing: _HalfPeriod, motion: _Motion) -> None:
+    def _learn(
+        self, swing: _HalfPeriod, motion: _Motion, so_far: list[_Longest]
+    ) -> None:
         """Lengthen the wait if a completed half period requires it, unless this was a rotation or disturbed by a push.
 
         A pushed swing counts if there is no deck and this motion has not swung without a push before.
         """
-        if swing.strength <= 0:
-            return
-        of_energy = motion is self._energy
-        so_far = self._longest_of_energy if of_energy else self._longest_of_parts
-        longest = (
-            so_far[-1]
-            if so_far
-            else _Longest(swing.seen_at, 0.0, 0.0, motion.name, swing.seen_at, 0.0)
-        )
+        longest = so_far[-1]
         strongest = max(longest.strength, swing.strength)
-        free = self._evidence.free_since(swing.end) <= swing.begin
-        motion.has_free_swing |= free
-        too_long = free and swing.half > _LONGEST_FREE * self._half_of_springs
-        is_vibration = swing.strength >= _ROTATION * strongest and not too_long
-        counts = is_vibration and (free or not (motion.has_free_swing or self._least))
-        swing_half = longest.swing
-        if is_vibration:
-            cut = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
-            swing_half = max(swing_half, cut)
-        longest = longest._replace(
-            since=swing.seen_at, strength=strongest, swing=swing_half
-        )
-        if counts and swing.half > longest.half:
-            longest = longest._replace(
-                half=swing.half, name=motion.name, over=swing.seen_at
-            )
+        longest = longest._replace(since=swing.seen_at, strength=strongest)
+        is_free = self._evidence.free_since(swing.end) <= swing.begin
+        motion.has_free_swing |= is_free
+        is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
+        if swing.strength >= _ROTATION * strongest and not is_too_long:
+            half = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
+            longest = longest._replace(swing=max(longest.swing, half))
+            counts = is_free or not (motion.has_free_swing or self._least)
+            if counts and swing.half > longest.half:
+                longest = longest._replace(
+                    half=swing.half, name=motion.name, over=swing.seen_at
+                )
         so_far.append(longest)
 
-    def needed(self, start: float, now: float) -> float | None:
-        """Return the wait for a flight that began at ``start``, from the states up to ``now`` [time]; None if unknown.
-
-        Raises
-        ------
-        RangeError
-            If a given wait is over and is shorter than half of a known period.
-        """
-        wait = self.wait(start, now)
-        return wait.time if wait else None
-
     def wait(self, start: float, now: float) -> Wait | None:
-        """Return the wait of `needed` with its reason."""
-        at_rest = self._is_at_rest(start, now)
-        if self._given is None and at_rest:
+        """Return the wait of a flight since ``start``, from the states up to ``now`` [time]; None if it is unknown."""
+        longest = self.longest(now)
+        if self._given is not None:
+            reason = "as given"
+            if longest is not None and longest.time > self._given:
+                reason = f"as given, but {longest.reason}"
+            return Wait(self._given, "given", reason)
+        if self._is_at_rest(start, now):
             time = self._evidence.history.time
             return Wait(
                 float(time[FEWEST - 1] - time[0]),
                 "at-rest",
                 f"nothing vibrates: {FEWEST} states are enough",
             )
-        longest = self.longest(now)
-        if self._given is None:
-            unknown = self._least is None and self._has_long_ongoing_swing(now)
-            return None if unknown else longest
-        if now - start >= self._given and not at_rest:
-            names = ", ".join(self._evidence.history.source)
-            check_wait(self._given, longest, names)
-        return Wait(self._given, "given", "as given")
+        if self._least is None and self._has_long_ongoing_swing(now):
+            return None
+        return longest
 
     def longest(self, now: float) -> Wait | None:
         """Return the longest half period known ``now``, from the deck or from the record so far."""
         longest = self._get_longest(now)
-        if longest is None or longest.half <= (
-            self._least.time if self._least else 0.0
-        ):
+        if longest.half <= (self._least.time if self._least else 0.0):
             return self._least
         reason = f"{longest.name} took {longest.half:.3g} for half a period, until {longest.over:.6g}"
         return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
         """Return the longest half period known ``now``, even if a push lengthened it [time]."""
-        longest = self._get_longest(now)
-        of_record = longest.swing if longest else 0.0
-        return max(of_record, self._least.time if self._least else 0.0)
+        least = self._least.time if self._least else 0.0
+        return max(self._get_longest(now).swing, least)
 
-    def _get_longest(self, now: float) -> _Longest | None:
+    def _get_longest(self, now: float) -> _Longest:
         """Return the longest half period known at a time: from the parts, or from the energy while no part moves."""
-        has_parts = any(motion.begins <= now for motion in self._part_motions)
+        has_parts = self._parts_since <= now
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
-        count = bisect_right(so_far, now, key=lambda longest: longest.since)
-        return so_far[count - 1] if count else None
+        return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]
 
     def _is_at_rest(self, start: float, now: float) -> bool:
         """Return True if no force has acted since the record began, and nothing vibrates."""
         history = self._evidence.history
         if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
             return False
-        energies = [history.energy]
+        energies: list[Samples | None] = [history.energy]
         if balance := history.balance:
-            terms = (balance.internal, balance.kinetic, balance.external_work)
-            energies += [term for term in terms if term is not None]
+            energies += (balance.internal, balance.kinetic, balance.external_work)
         inside = find_window(history.time, start, now)
-        largest = [float(np.abs(energy[inside]).max()) for energy in energies]
+        largest = [
+            float(np.abs(energy[inside]).max())
+            for energy in energies
+            if energy is not None
+        ]
         return largest[0] <= _ROUND_OFF * max(largest)
 
     def _has_long_ongoing_swing(self, now: float) -> bool:
         """Return True if an unfinished oscillation is already much longer than all earlier ones."""
-        longest = self._get_longest(now)
-        strongest = longest.strength if longest else 0.0
-        motions = [
-            motion
-            for motion in self._part_motions
-            if motion.begins <= now <= motion.ends
-        ]
-        for motion in motions or [self._energy]:
-            swing = motion.find_ongoing(now)
-            if (
-                swing is not None
-                and swing.strength >= _ROTATION * strongest
-                and swing.duration > _MUCH_LONGER * swing.longest_half_before
-            ):
-                return True
-        return False
+        least_strength = _ROTATION * self._get_longest(now).strength
+        motions = [motion for motion in self._part_motions if motion.covers(now)]
+        return any(
+            motion.outlasts_earlier_swings(now, least_strength)
+            for motion in motions or [self._energy]
+        )
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
@@ -444,9 +372,3 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
             f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a known period: {longest.reason}; a gap in the "
             "load would be treated as flight, so give a longer one"
         )
-
-
-def _find_last_extreme(values: Samples) -> int:
-    """Return the state at which values (n,) differ most from the last value; if there are several, the last of them."""
-    distance = np.abs(values - values[-1])
-    return int(np.flatnonzero(distance == distance.max())[-1])

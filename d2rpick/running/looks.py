@@ -61,15 +61,13 @@ class Looks:
             # A file no longer exists, so all files are read from their start.
             self._resume_points, self._last_states = {}, []
         history = self._read_on(names)
-        new_states = None
-        if history is not None:
-            new_states = skip_states(history, self._last_states)
-        if history is None or new_states is None:
-            history = self._read_whole(names)
-            new_states = skip_states(history, self._last_states)
-        follows = new_states is not None
+        new_states = history and skip_states(history, self._last_states)
+        follows = True
         if new_states is None:
-            new_states, self._last_states = history, []
+            whole = self._read_whole(names)
+            new_states = skip_states(whole, self._last_states)
+            if new_states is None:
+                new_states, follows, self._last_states = whole, False, []
         self._names = frozenset(names)
         self._last_states = find_last_states(new_states, self._last_states)
         return new_states, follows

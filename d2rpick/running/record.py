@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.histories.history import Given, History
+from d2rpick.histories.history import Given, History, list_columns, select_states
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, Momenta, Precision
+    from d2rpick.histories.history import Balance, Momenta
 
     Table = History | Momenta | Balance
 
@@ -56,38 +56,33 @@ class GrowingRecord:
 
     def __init__(self) -> None:
         self._latest_tables: list[Table] = []
-        self._columns: list[dict[str, GrowingColumn]] = []
+        # By the number of a table and the name of a column.
+        self._columns: dict[tuple[int, str], GrowingColumn] = {}
         self._history: History | None = None
 
     def add(self, states: History) -> None:
         """Append states, which must have the same quantities as the states so far."""
-        tables = list_tables(states)
-        self._latest_tables = tables
-        arrays = [_get_arrays(table) for table in tables]
-        if not self._columns:
-            self._columns = [
-                {name: GrowingColumn() for name in table} for table in arrays
-            ]
-        for columns, table in zip(self._columns, arrays, strict=True):
-            for name, rows in table.items():
-                columns[name].add(rows)
+        self._latest_tables = _list_tables(states)
+        for number, table in enumerate(self._latest_tables):
+            for name, rows in list_columns(table).items():
+                self._columns.setdefault((number, name), GrowingColumn()).add(rows)
         self._history = None
 
     @property
     def history(self) -> History:
         """All states as one history; at least one state must exist."""
         if self._history is None:
-            tables: list[Any] = []
-            for table, columns in zip(self._latest_tables, self._columns, strict=True):
-                rows: dict[str, Any] = {
-                    name: column.rows for name, column in columns.items()
-                }
-                tables.append(replace(table, **rows))
-            self._history = _join_tables(tables)
+            columns: list[dict[str, Any]] = [{} for _ in self._latest_tables]
+            for (number, name), column in self._columns.items():
+                columns[number][name] = column.rows
+            pairs = zip(self._latest_tables, columns, strict=True)
+            self._history = _join_tables(
+                [replace(table, **rows) for table, rows in pairs]
+            )
         return self._history
 
 
-def list_tables(history: History) -> list[Table]:
+def _list_tables(history: History) -> list[Table]:
     """Return the history itself, each of its momenta, and its balance if there is one.
 
     The energies of single parts, many numbers that are not needed here, are left out.
@@ -100,11 +95,9 @@ def list_tables(history: History) -> list[Table]:
 
 
 def _join_tables(tables: Sequence[Any]) -> History:
-    """Build a history from its tables, which are in the order of `list_tables`."""
-    history, *evidence = tables
-    momenta_count = len(history.momenta)
-    momenta, balances = evidence[:momenta_count], evidence[momenta_count:]
-    balance = balances[0] if balances else None
+    """Build a history from its tables, which are in the order of `_list_tables`."""
+    history, *momenta = tables
+    balance = momenta.pop() if history.balance else None
     written = Given(tuple(momenta), balance, history.masses)
     joined: History = replace(history, evidence=written)
     return joined
@@ -112,31 +105,29 @@ def _join_tables(tables: Sequence[Any]) -> History:
 
 def hold_back_states(history: History) -> History:
     """Return a history without its last state, if a later state with the same printed time may still replace it."""
-    first, *evidence = list_tables(history)
-    settled: list[Any] = [_drop_unsettled(first, history.time_precision)]
-    for table in evidence:
-        assert not isinstance(table, History)
-        settled.append(_drop_unsettled(table, table.precision))
-    return _join_tables(settled)
+    return _join_tables([_drop_unsettled(table) for table in _list_tables(history)])
 
 
-def _drop_unsettled(table: Table, precision: Precision) -> Table:
+def _drop_unsettled(table: Table) -> Table:
     """Return a table without its last state if its last two times are as close as printed times can be."""
-    quantum = precision.quantum(float(table.time[-1])) if table.time.size else 0.0
-    if table.time.size < 2 or table.time[-1] - table.time[-2] > _APART * quantum:
+    if isinstance(table, History):
+        precision = table.time_precision
+    else:
+        precision = table.precision
+    last_times = table.time[-2:].tolist()
+    quantum = precision.quantum(last_times[-1]) if last_times else 0.0
+    if len(last_times) < 2 or last_times[1] - last_times[0] > _APART * quantum:
         return table
-    return _select_rows(table, slice(-1))
+    return select_states(table, slice(-1))
 
 
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
     """Return the last state of each table of a history; for an empty table, the last state in the tables ``before``."""
-    tables = list_tables(history)
-    last_states: list[Any] = []
-    for number, table in enumerate(tables):
-        if table.time.size:
-            last_states.append(_select_rows(table, slice(-1, None)))
-        else:
-            last_states.append(before[number] if before else table)
+    last_states: list[Table] = []
+    tables = _list_tables(history)
+    for table, last_state in zip(tables, before or tables, strict=True):
+        latest = table if table.time.size else last_state
+        last_states.append(select_states(latest, slice(-1, None)))
     return last_states
 
 
@@ -145,40 +136,30 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
     ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
     """
-    tables = list_tables(history)
-    if not last_states or len(tables) != len(last_states):
+    tables = _list_tables(history)
+    if len(tables) != len(last_states):
         return None
-    new_tables: list[Any] = []
+    new_tables: list[Table] = []
     for table, last_state in zip(tables, last_states, strict=True):
-        count = _count_known_states(table, last_state)
-        if count is None:
+        last_time = last_state.time.max(initial=-np.inf)
+        count = int(np.searchsorted(table.time, last_time, side="right"))
+        if last_state.time.size and not _contains(table, count - 1, last_state):
             return None
-        new_tables.append(_select_rows(table, slice(count, None)))
+        new_tables.append(select_states(table, slice(count, None)))
     return _join_tables(new_tables)
 
 
-def _count_known_states(table: Table, last_state: Table) -> int | None:
-    """Count the states of a table up to the last known state; None if the table does not contain that state."""
-    arrays, last_values = _get_arrays(table), _get_arrays(last_state)
-    if arrays.keys() != last_values.keys():
-        return None
-    if not last_state.time.size:
-        return 0
-    count = int(np.searchsorted(table.time, last_state.time[0], side="right"))
-    if not count:
-        return None
-    for name, rows in arrays.items():
-        largest = float(np.max(np.nan_to_num(np.abs(rows)), initial=0.0))
-        is_same = np.isclose(
-            rows[count - 1],
-            last_values[name][0],
-            rtol=0,
-            atol=_SAME * largest,
-            equal_nan=True,
-        )
-        if not np.all(is_same):
-            return None
-    return count
+def _contains(table: Table, state: int, last_state: Table) -> bool:
+    """Return True if a state of a table, -1 if there is none, has the values of the last known state."""
+    columns, last_values = list_columns(table), list_columns(last_state)
+    if state < 0 or columns.keys() != last_values.keys():
+        return False
+    for name, rows in columns.items():
+        tolerance = _SAME * float(np.nanmax(np.abs(rows), initial=0.0))
+        value, last_value = rows[state], last_values[name][0]
+        if not np.allclose(value, last_value, rtol=0, atol=tolerance, equal_nan=True):
+            return False
+    return True
 
 
 def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
@@ -187,23 +168,3 @@ def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
         if (momenta.parts is not None) is of_parts:
             return momenta
     return None
-
-
-def _select_rows(table: Table, rows: slice) -> Table:
-    """Return a table with some of its rows."""
-    selected: dict[str, Any] = {
-        name: values[rows] for name, values in _get_arrays(table).items()
-    }
-    return replace(table, **selected)
-
-
-def _get_arrays(table: Table) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a table with one row for each of its times, by name."""
-    names = [field.name for field in fields(table) if field.init]
-    values = {name: getattr(table, name) for name in names if name != "masses"}
-    size = table.time.size
-    return {
-        name: value
-        for name, value in values.items()
-        if isinstance(value, np.ndarray) and len(value) == size
-    }

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
+from d2rpick.deck.engine_files import MOST_LEGS
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.window import FEWEST
 
@@ -21,9 +22,8 @@ LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are equal if they differ by less than this number of states: a history may end one state early.
 _STATES: Final = 1.5
-# _MOST_LEGS: the solver numbers legs from 1 to 99. _KEPT_BACK: once only this many numbers are left,
-# no further flight is switched, so that the run reaches its end.
-_MOST_LEGS, _KEPT_BACK = 99, 10
+# Once only this many numbers of legs are left, no further flight is switched, so that the run reaches its end.
+_KEPT_BACK: Final = 10
 # Shortest deformable leg in a flight, as a share of the wait (the force-free time that shows a flight).
 # tr is the start or the end of this leg, whichever has the higher energy.
 _LEAST: Final = 0.25
@@ -167,6 +167,7 @@ class Window(NamedTuple):
     """A flight that was switched at ``tr`` and ``td``, or left deformable for a ``reason``.
 
     ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
+    ``warning`` is about a part that moves so much that the body may be out of place at td; otherwise "".
     """
 
     free: float
@@ -175,6 +176,7 @@ class Window(NamedTuple):
     contact: float | None
     wait: float
     reason: str | None = None
+    warning: str = ""
 
 
 def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
@@ -187,31 +189,22 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     """
     if not legs:  # So many states show whether parts at rest fall.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
-    last = legs[-1].order
-    if last.rigid and legs[-1].findings.contact is not None:
-        order: Order | None = _return_before_contact(legs, limits)
+    last, findings = legs[-1].order, legs[-1].findings
+    if findings.contact is not None:
+        order = _return_before_contact(legs, limits)
     elif last.until >= limits.end:
-        order = None
+        return None
     elif last.kind == PROBE:
-        tr = _get_first_rigid_leg(legs).start
-        order = last.following(
-            PROBE, _determine_probe_end(legs, tr, last.until, limits)
-        )
+        order = last.following(PROBE, _determine_probe_end(legs, last.until, limits))
     elif last.kind == RIGID:
-        order = _follow_window(last, legs[-1], limits)
+        order = _follow_window(last, findings, limits)
     else:
         order = _follow_load(legs, limits)
-    if order and order.number > _MOST_LEGS:
+    if order.number > MOST_LEGS:
         raise D2RPickError(
-            f"the run needs more than {_MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
+            f"the run needs more than {MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
         )
     return order
-
-
-def _follow_window(last: Order, leg: Leg, limits: Limits) -> Order:
-    """Return the order for a deformable leg after td. The flight in which the window ends is not switched again."""
-    load = last.following(LOAD, _determine_load_end(leg, limits))
-    return load._replace(switch_after=last.until)
 
 
 def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
@@ -221,47 +214,43 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
         findings.flies
         and findings.free >= last.switch_after
         and limits.end - last.until > _WORTH * limits.end
-        and last.number <= _MOST_LEGS - _KEPT_BACK
+        and last.number <= MOST_LEGS - _KEPT_BACK
     )
     if not switches:
-        return last.following(LOAD, _determine_load_end(legs[-1], limits))
+        return _order_load(last, findings, limits)
     if findings.idle or findings.tr > last.start:
-        return last.following(
-            PROBE, _determine_probe_end(legs, last.until, last.until, limits)
-        )
+        return last.following(PROBE, _determine_probe_end(legs, last.until, limits))
     # The energy was higher at the start of the leg, so the probe replaces the leg.
-    until = _determine_probe_end(legs, last.start, last.start, limits)
+    until = _determine_probe_end(legs, last.start, limits)
     return last._replace(kind=PROBE, until=until)
 
 
-def _determine_load_end(leg: Leg, limits: Limits) -> float:
-    """Return when the next deformable leg ends: as soon as a current or past flight has been long enough."""
-    now, findings = leg.order.until, leg.findings
-    legs_left = _MOST_LEGS - _KEPT_BACK - leg.order.number
+def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
+    """Return the order for a deformable leg after td. The flight in which the window ends is not switched again."""
+    return _order_load(last, findings, limits)._replace(switch_after=last.until)
+
+
+def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
+    """Order a deformable leg that ends as soon as a current or past flight has been long enough."""
+    now, end = last.until, limits.end
+    legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
-        return limits.end
+        return last.following(LOAD, end)
     in_flight = (
-        not leg.order.rigid
-        and findings.free >= leg.order.switch_after
-        and not findings.flies
+        not last.rigid and findings.free >= last.switch_after and not findings.flies
     )
     flight_start = findings.free if in_flight else now
-    wait = findings.wait or _UNKNOWN * limits.end
-    until = max(
-        flight_start + wait,
-        now + _LEAST * wait,
-        now + (limits.end - now) / legs_left,
-    )
-    return limits.until_end(until)
+    wait = findings.wait or _UNKNOWN * end
+    until = max(flight_start + wait, now + _LEAST * wait, now + (end - now) / legs_left)
+    return last.following(LOAD, limits.until_end(until))
 
 
-def _determine_probe_end(
-    legs: Sequence[Leg], tr: float, now: float, limits: Limits
-) -> float:
-    """Return the end of the next leg of a probe that began at ``tr``; the leg begins at ``now``."""
+def _determine_probe_end(legs: Sequence[Leg], now: float, limits: Limits) -> float:
+    """Return the end of the next leg of a probe; the leg begins at ``now``, the probe there or in an earlier leg."""
+    flown = now - _get_first_rigid_leg(legs).start if legs[-1].order.rigid else 0.0
     length = max(
         get_flight_findings(legs).wait or 0.0,
-        _OF_FLOWN * (now - tr),
+        _OF_FLOWN * flown,
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
     )
@@ -273,74 +262,64 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
     findings = get_flight_findings(legs)
     if window.reason:
-        number, now = first.number, first.start
-        until = _determine_load_end(
-            Leg(Order(RIGID, number - 1, now, now), findings), limits
-        )
-        return Order(LOAD, number, now, until, switch_after=now + limits.same)
-    kept_legs = [
-        order
-        for order in collect_joined_legs(legs[-1].order, legs)
-        if order.until <= window.td
-    ]
-    if not kept_legs:
+        before = first._replace(number=first.number - 1, until=first.start)
+        load = _order_load(before, findings, limits)
+        return load._replace(switch_after=first.start + limits.same)
+    last = None
+    for order in collect_joined_legs(legs[-1].order, legs):
+        if order.until <= window.td:
+            last = order
+    if last is None:
         return first._replace(kind=RIGID, until=window.td)
-    last = kept_legs[-1]
     if last.until == window.td:
-        return _follow_window(last, Leg(last, findings), limits)
+        return _follow_window(last, findings, limits)
     return last.following(RIGID, window.td)
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact that the last leg has shown; without a contact, up to the end of the run."""
-    tr, findings, contact = (
-        _get_first_rigid_leg(legs).start,
-        get_flight_findings(legs),
+    rigid_orders = collect_joined_legs(legs[-1].order, legs)
+    findings = get_flight_findings(legs)
+    free, wait = findings.free, findings.wait or 0.0
+    tr, end, contact = (
+        rigid_orders[0].start,
+        rigid_orders[-1].until,
         legs[-1].findings.contact,
     )
-    wait = findings.wait or 0.0
     if contact is None:
-        return Window(findings.free, tr, legs[-1].order.until, None, wait)
-    flight = contact - findings.free
-    td = contact - limits.margin_of(flight, idle=findings.idle)
-    leg_ends = [
-        order.until
-        for order in collect_joined_legs(legs[-1].order, legs)
-        if 0 <= td - order.until <= limits.same
-    ]
-    td = max(leg_ends, default=td)  # A leg must have at least two states.
-    reason = _explain_too_little_saved(legs, td - tr, limits)
-    if not findings.idle and flight < _SWINGS * findings.swing:
+        return Window(free, tr, end, None, wait)
+    td = contact - limits.margin_of(contact - free, idle=findings.idle)
+    for order in rigid_orders:
+        if 0 <= td - order.until <= limits.same:
+            td = order.until  # A leg must have at least two states.
+    reason = _explain_too_little_saved(legs, tr, td, limits)
+    if not findings.idle and contact - free < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
-    return Window(findings.free, tr, td, contact, wait, reason)
+    is_out_of_place = reason is None and td - free < findings.steady_from
+    warning = findings.swing_warning if is_out_of_place else ""
+    return Window(free, tr, td, contact, wait, reason, warning)
 
 
 def _explain_too_little_saved(
-    legs: Sequence[Leg], rigid_time: float, limits: Limits
+    legs: Sequence[Leg], tr: float, td: float, limits: Limits
 ) -> str | None:
     """Explain why a window saves less than its probe and restarts cost; None if it saves more.
 
     The comparison uses cycles, because CPU times vary and the same command must compute the same run.
     """
-    if rigid_time <= 0:
+    if td <= tr:
         return "its margin begins before tr"
-    tr = _get_first_rigid_leg(legs).start
-    rigid_legs = [leg for leg in legs if leg.order.rigid and leg.order.start >= tr]
-    cost = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in rigid_legs)
-    saved = (rigid_time - cost / _count_deformable_cycles(legs)) / limits.end
+    cost, cycles, length = 0.0, 0, 0.0  # cost in deformable cycles
+    for leg in legs:
+        if not leg.order.rigid:
+            cycles += leg.cycles or 0
+            length += leg.length if leg.cycles else 0.0
+        elif leg.order.start >= tr:
+            cost += (leg.cycles or 0) * limits.rigid_cycle + _RESTART
+    saved = (td - tr - cost * length / max(cycles, 1)) / limits.end
     if saved >= _WORTH:
         return None
     return f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
-
-
-def _count_deformable_cycles(legs: Sequence[Leg]) -> float:
-    """Return the number of deformable cycles per unit of time, over all legs so far [1/time]; infinity without any."""
-    deformable = [leg for leg in legs if not leg.order.rigid and leg.cycles]
-    if not deformable:
-        return float("inf")
-    return sum(leg.cycles or 0 for leg in deformable) / sum(
-        leg.length for leg in deformable
-    )
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:

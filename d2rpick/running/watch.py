@@ -21,7 +21,7 @@ from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
@@ -54,23 +54,22 @@ class Watch:
         wait: float | None = None,
         inventory: Inventory | None = None,
     ) -> None:
-        self._names, self._selection = names, selection
-        self._wait, self._inventory = wait, inventory
-        self._wait_of_deck = wait_of_deck(inventory) if inventory else None
-        self._looks = Looks(selection, inventory)
+        self._names = names
+        self._of_looks = (selection, inventory)
+        self._waits = (wait, wait_of_deck(inventory) if inventory else None)
+        self._looks = Looks(*self._of_looks)
         self._begin_again()
-        self._files: list[tuple[str, os.stat_result]] = []
+        self._files: dict[str, os.stat_result] = {}
         self._events: tuple[Event, ...] = ()  # events reported so far
         self._error: FormatError | HistoryError | None = None
-        self._last_time = float("-inf")
+        self._last_time: float | None = None
         self._report_silence_after = _SILENT
-        self._wait_unknown = False
         self.ended: str | None = None
 
     def _begin_again(self) -> None:
         """Forget all states of the run, but not the reported events."""
         self._evidence = GrowingEvidence()
-        self._motion = InnerMotion(self._wait, self._wait_of_deck)
+        self._motion = InnerMotion(*self._waits)
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
@@ -82,20 +81,21 @@ class Watch:
             If the files cannot be read although nothing is written to them any more, they contain nothing that shows a
             force, or the given wait is too short.
         """
-        files, files_before = list(_list_files(self._names)), self._files
+        files, files_before = _find_files(self._names), self._files
         if _list_stamps(files) != _list_stamps(files_before):
             self._files = files
             self._report_silence_after = _SILENT
-            rewritten = _is_rewritten(files_before, files)
             try:
-                yield from self._read([name for name, _ in files], rewritten=rewritten)
+                yield from self._read([*files], _is_rewritten(files_before, files))
                 self._error = None
             except (FormatError, HistoryError) as error:
                 self._error = error  # The solver may just be writing the file.
-                self._looks = Looks(self._selection, self._inventory)
-        if files and not self.ended and self._last_time > float("-inf"):
-            yield from self._check_end(files[-1][0])
-        silence = self._measure_silence()
+                self._looks = Looks(*self._of_looks)
+        if self._last_time is not None and files and not self.ended:
+            yield from self._check_end([*files][-1])
+        now = time.time()
+        written = max((status.st_mtime for status in files.values()), default=now)
+        silence = now - written
         if self._error and silence > _SILENT:
             raise self._error
         if silence > self._report_silence_after and not self.ended:
@@ -109,28 +109,28 @@ class Watch:
 
     def state(self) -> Event:
         """Return whether the parts fly now, and since when."""
-        if not self._events and self._last_time == float("-inf"):
+        time, message = None, "no flight yet"
+        if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
-        events = [
-            event for event in self._events if event.event in ("flight", "contact")
-        ]
-        if events and events[-1].event == "flight":
-            start = events[-1].time
-            state = self._make_event("state", f"flies since {start:.6g}")
-            return state._replace(time=start)
-        message = (
-            f"no flight since {events[-1].time:.6g}" if events else "no flight yet"
-        )
-        if self._wait_unknown:
+        for event in self._events:
+            if event.event == "flight":
+                time, message = event.time, f"flies since {event.time:.6g}"
+            elif event.event == "contact":
+                time, message = None, f"no flight since {event.time:.6g}"
+        if (
+            time is None
+            and self._motion.longest(self._last_time) is None
+            and self._waits[0] is None
+        ):
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
             )
-        return self._make_event("state", message)
+        return self._make_event("state", message)._replace(time=time)
 
-    def _read(self, names: Sequence[str], *, rewritten: bool) -> Iterator[Event]:
+    def _read(self, names: Sequence[str], is_rewritten: bool) -> Iterator[Event]:
         """Read the new states and return their events."""
         if not names:
             return
@@ -145,19 +145,22 @@ class Watch:
         self._evidence.take(states)
         self._motion.take(states, self._evidence)
         time = self._evidence.history.time
-        now = float(time[-1])
+        now, before = float(time[-1]), self._last_time
         events = find_events(self._evidence, self._motion, self._decided)
-        reported = self._events
-        if self._last_time == float("-inf"):
+        kept_count = len(self._events)
+        if before is None:
             message = f"the run has reached {now:.6g}"
             yield Event("begun", float(time[0]), now, message)
-        elif rewritten or now < self._last_time:
-            pairs = zip(reported, events, strict=False)
-            reported = tuple(before for before, event in pairs if before == event)
-            yield from self._report_restart(len(reported), now)
+        elif is_rewritten or now < before:
+            pairs = zip(self._events, events, strict=False)
+            kept_count = sum(event == event_before for event, event_before in pairs)
+            message = (
+                f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
+            )
+            yield Event("restart", now, now, message)
+            yield from _expect_contact(self._events[kept_count:], now)
         self._last_time, self._events = now, events
-        self._wait_unknown = self._wait is None and self._motion.longest(now) is None
-        yield from events[len(reported) :]
+        yield from events[kept_count:]
 
     def _check_end(self, name: str) -> Iterator[Event]:
         """Report once that the run has ended, if the listing next to its last file says so."""
@@ -166,27 +169,17 @@ class Watch:
             event = "failed" if self.ended == WITH_AN_ERROR else "ended"
             yield self._make_event(event, f"the run has ended {self.ended}")
 
-    def _report_restart(self, kept_count: int, now: float) -> Iterator[Event]:
-        """Report that a run restarted from an earlier time, and when to expect the contact seen after ``now``."""
-        message = f"the run was restarted: it was at {self._last_time:.6g} and is now at {now:.6g}"
-        yield Event("restart", now, now, message)
-        for event in self._events[kept_count:]:
-            if event.event == "contact":
-                if event.time is not None and event.time > now:
-                    message = "a contact is expected there, as before the restart"
-                    yield Event("expected", event.time, now, message)
-                return
-
     def _make_event(self, event: str, message: str) -> Event:
-        """Return an event at the last state. A "state" event has no separate time."""
-        now = None if self._last_time == float("-inf") else self._last_time
-        return Event(event, None if event == "state" else now, now, message)
+        """Return an event at the last state."""
+        return Event(event, self._last_time, self._last_time, message)
 
-    def _measure_silence(self) -> float:
-        """Return the time for which the files did not change [s]."""
-        now = time.time()
-        written = max((status.st_mtime for _, status in self._files), default=now)
-        return max(0.0, now - written)
+
+def _expect_contact(lost_events: Sequence[Event], now: float) -> Iterator[Event]:
+    """Report when to expect the first contact among the events that a restart has taken back."""
+    times = [event.time for event in lost_events if event.event == "contact"]
+    if times and times[0] is not None and times[0] > now:
+        message = "a contact is expected there, as before the restart"
+        yield Event("expected", times[0], now, message)
 
 
 def follow(
@@ -210,38 +203,38 @@ def follow(
         rest(min(pause, remaining))
 
 
-def _list_files(names: Sequence[str]) -> Iterator[tuple[str, os.stat_result]]:
-    """Return the non-empty files of a run, including those of later legs in the same folder."""
+def _find_files(names: Sequence[str]) -> dict[str, os.stat_result]:
+    """Return the non-empty files of a run, including those of later legs in the same folder, with their status."""
     try:
         paths = expand(names)
     except FormatError as error:
         if "several runs" in str(error):
             raise
-        return
+        return {}
+    files = {}
     for path in (*paths, *find_later_legs(paths)):
         with suppress(OSError):  # The file may not exist yet, or no longer.
             status = Path(path).stat()
             if status.st_size:
-                yield path, status
+                files[path] = status
+    return files
 
 
 def _list_stamps(
-    files: Sequence[tuple[str, os.stat_result]],
+    files: Mapping[str, os.stat_result],
 ) -> list[tuple[str, int, int, int]]:
     """Return, for each file, the properties that change when it is written."""
     return [
         (name, status.st_ino, status.st_size, status.st_mtime_ns)
-        for name, status in files
+        for name, status in files.items()
     ]
 
 
 def _is_rewritten(
-    files_before: Sequence[tuple[str, os.stat_result]],
-    files: Sequence[tuple[str, os.stat_result]],
+    files_before: Mapping[str, os.stat_result], files: Mapping[str, os.stat_result]
 ) -> bool:
     """Return True if a file is gone or has become shorter."""
-    sizes = {name: status.st_size for name, status in files}
     return any(
-        name not in sizes or sizes[name] < status.st_size
-        for name, status in files_before
+        name not in files or files[name].st_size < status.st_size
+        for name, status in files_before.items()
     )

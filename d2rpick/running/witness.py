@@ -10,7 +10,7 @@ past the middle of the flight.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import Law
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
+    from d2rpick.running.inner_motion import Wait
 
-    # Returns the wait: the force-free time [time] that shows a flight since ``start``, from the states up to ``now``.
-    # None if it is unknown.
-    Needed = Callable[[float, float], float | None]
+    # Returns the wait of a flight since ``start``, from the states up to ``now``; None if it is unknown.
+    Needed = Callable[[float, float], Wait | None]
 
 # A momentum or contact energy is constant within this share of its largest value so far.
 # Sums in single precision have errors of 1/10 of this.
@@ -52,8 +52,8 @@ class Quiet(NamedTuple):
         State at which the wait was over [time].
     end : float or None
         First state at which a force acts [time]; None if the record ends before.
-    wait : float
-        Force-free time that shows a flight [time].
+    wait : Wait
+        Force-free time that showed the flight.
     source : str
         "momentum" or "contact-energy".
     left : float
@@ -69,7 +69,7 @@ class Quiet(NamedTuple):
     start: float
     seen: float
     end: float | None
-    wait: float
+    wait: Wait
     source: str
     left: float
     gravity: float = 0.0
@@ -80,15 +80,9 @@ class Quiet(NamedTuple):
 class _SampledFall(FreeFall):
     """The law of free fall, compared with a sample of the states of a long window."""
 
-    def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
-        if last - first <= _MOST_COMPARED:
-            return super()._fitted(first, last)
-        states = np.linspace(first, last, _MOST_COMPARED).round().astype(np.intp)
-        sampled = FreeFall.__new__(FreeFall)
-        sampled.time = self.time[states]
-        sampled.momentum = self.momentum[states]
-        sampled._both = self._both[states]
-        return sampled._fitted(0, _MOST_COMPARED - 1)
+    def _select_states(self, first: int, last: int) -> NDArray[np.intp]:
+        count = min(last - first + 1, _MOST_COMPARED)
+        return np.linspace(first, last, count).round().astype(np.intp)
 
 
 class GrowingWitness:
@@ -98,53 +92,52 @@ class GrowingWitness:
     ----------
     members : tuple of int
         Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
-    origin : int
-        Number of its first state in the record.
     free : list of int
         For each state, the first state from which on no force shows up to it.
     flights : list of Quiet
         Flights so far.
+    pauses : list of (float, float)
+        Start and end of each force-free time that ended before it was seen as a flight [time].
     """
 
     def __init__(
-        self, members: tuple[int, ...], parts: tuple[Part, ...] | None, origin: int
+        self, members: tuple[int, ...], parts: tuple[Part, ...] | None
     ) -> None:
-        self.members, self.parts, self.origin = members, parts, origin
+        self.members, self.parts = members, parts
         self.free: list[int] = []
         self.flights: list[Quiet] = []
+        self.pauses: list[tuple[float, float]] = []
+        self._columns = GrowingColumn()
+        self._laws: list[tuple[Law, Samples]] = []
         # For each state, True if the printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
-        names = ("time", "momentum", "contact", "alone")
-        self._columns = {name: GrowingColumn() for name in names}
-        self._tested_count = self._test_again_at = 0
+        self._start = 0.0  # of the force-free time at the last examined state
+        self._examined_count = self._test_again_at = 0
 
     @property
     def time(self) -> Samples:
         """Times of the states, shape (n,) [time]."""
-        return self._columns["time"].rows
+        return self._columns.rows[:, 0]
 
-    def add(self, **rows: NDArray[Any] | None) -> None:
-        """Append states: time, momentum (k, 3), contact energy (k,); ``alone`` if all other parts are at rest."""
-        for name, values in rows.items():
-            if values is not None:
-                self._columns[name].add(values)
-
-    def follow(
-        self, momentum_precision: Precision, contact_precision: Precision
+    def add(
+        self,
+        columns: Samples,
+        momentum_precision: Precision,
+        contact_precision: Precision,
     ) -> None:
-        """Find the force-free time at each new state, with the precisions of the written values."""
-        self._laws: list[tuple[Law, Samples]] = []
-        contact = self._columns["contact"].rows
-        momentum = self._columns["momentum"].rows
-        if contact.size == self.time.size:
-            tolerance, self._shows_forces = _set_tolerance(
-                np.abs(contact), contact_precision
-            )
-            # Contact energy shows collisions between bodies, which do not change the total momentum.
-            # Once other parts move, it shows their contacts too and is no longer used.
-            alone = self._columns["alone"].rows
-            law = Constant(self.time, contact[:, np.newaxis])
-            self._laws.append((law, np.where(alone, tolerance, np.inf)))
+        """Append states, and find the force-free time at each.
+
+        ``columns`` (k, 5) are time, contact energy (NaN where it is not used), and momentum.
+        """
+        self._columns.add(columns)
+        contact, momentum = self._columns.rows[:, 1], self._columns.rows[:, 2:]
+        self._laws = []
+        is_used = ~np.isnan(contact)
+        if is_used.any():
+            energy = np.nan_to_num(contact)
+            tolerance, self._shows_forces = _set_tolerance(energy, contact_precision)
+            law = Constant(self.time, energy[:, np.newaxis])
+            self._laws.append((law, np.where(is_used, tolerance, np.inf)))
         if self.members:
             largest = np.abs(momentum).max(axis=1)
             tolerance, self._shows_forces = _set_tolerance(
@@ -153,7 +146,7 @@ class GrowingWitness:
             self._laws.append((_SampledFall(self.time, momentum), tolerance))
         first = self.free[-1] if self.free else 0
         for state in range(len(self.free), self.time.size):
-            first = self._find_first_without_force(state, first)
+            first = self._find_first_without_force(first, state)
             self.free.append(first)
 
     def misfit(self, first: int, last: int) -> float:
@@ -163,61 +156,48 @@ class GrowingWitness:
             for law, tolerance in self._laws
         )
 
-    def last_without(self, first: int) -> int:
-        """Return the last state up to which no force has acted since ``first``."""
+    def _find_first_without_force(self, earliest: int, last: int) -> int:
+        """Return the first state from ``earliest`` on since which no force shows up to ``last``."""
+        if self.misfit(earliest, last) <= 1:
+            return earliest
         return find_farthest(
-            first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
+            last, earliest, lambda first: self.misfit(first, last) <= 1
         )
 
-    def _find_first_without_force(self, last: int, first: int) -> int:
-        """Return the first state at or after ``first`` without a visible force up to ``last``.
-
-        The step is doubled until it is too large, then bisected, so that few tests find a near or a far state.
-        """
-        if self.misfit(first, last) <= 1:
-            return first
-        with_force, step = first, 1
-        while self.misfit(min(with_force + step, last), last) > 1:
-            with_force += step
-            step *= 2
-        without_force = min(with_force + step, last)
-        while without_force - with_force > 1:
-            middle = (with_force + without_force) // 2
-            if self.misfit(middle, last) <= 1:
-                without_force = middle
-            else:
-                with_force = middle
-        return without_force
-
-    def look(
+    def examine(
         self,
         needed: Needed,
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
-        """Add the flights that are seen at the new states, and the ends of earlier flights.
+        """Add the flights that are seen at the new states, and the ends of earlier force-free times.
 
         ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
         """
-        for state in range(self._tested_count, len(self.free)):
-            first, now = self.free[state], float(self.time[state])
-            start = float(self.time[first])
-            flight = self.flights[-1] if self.flights else None
-            if flight is not None and flight.end is None:
-                if now - start < max(flight.wait, now - flight.start) / 2:
-                    self.flights[-1] = flight._replace(end=now)
-                    self._test_again_at = state
+        time = self.time
+        for state in range(self._examined_count, len(self.free)):
+            first, now = self.free[state], float(time[state])
+            start = float(time[first])
+            flies = bool(self.flights) and self.flights[-1].end is None
+            earlier_start = self.flights[-1].start if flies else self._start
+            if state > 0 and now - start < (now - earlier_start) / 2:
+                if flies:
+                    self.flights[-1] = self.flights[-1]._replace(end=now)
+                else:
+                    self.pauses.append((earlier_start, now))
+                self._test_again_at = state
             elif (
-                first + FEWEST <= state + 1
+                not flies
+                and first + FEWEST <= state + 1
                 and self._test_again_at <= state
                 and self._shows_forces[state]
             ):
                 wait = needed(start, now)
-                if wait is not None and now - start >= wait:
-                    gravity = find_gravity(self, first, state)
-                    self._see(first, state, wait, gravity)
-        self._tested_count = len(self.free)
+                if wait is not None and now - start >= wait.time:
+                    self._see(first, state, wait, find_gravity(self, first, state))
+            self._start = start
+        self._examined_count = len(self.free)
 
-    def _see(self, first: int, state: int, wait: float, gravity: float | None) -> None:
+    def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
         """Add a flight since ``first`` that is seen at a state. Without ``gravity``, only set when to test again."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
@@ -238,23 +218,23 @@ class GrowingWitness:
 
     def _find_level(self, first: int, last: int) -> float | None:
         """Return when the centre of mass is again as high as at ``first`` [time]; None if before ``last``."""
-        begin, end = self._columns["momentum"].rows[[first, last]]
-        gained = end - begin
-        duration = float(self.time[last] - self.time[first])
-        time_to_level = -2 * duration * float(begin @ gained) / float(gained @ gained)
-        if time_to_level <= duration:
-            return None
-        return float(self.time[first]) + time_to_level
+        begin, end = self._columns.rows[[first, last]]
+        gained = end[2:] - begin[2:]
+        time_to_level = (
+            -2 * (end[0] - begin[0]) * (begin[2:] @ gained) / (gained @ gained)
+        )
+        level = float(begin[0] + time_to_level)
+        return level if level > end[0] else None
 
 
 def _set_tolerance(
-    sizes: Samples, precision: Precision, count: int = 1
+    values: Samples, precision: Precision, count: int = 1
 ) -> tuple[Samples, NDArray[np.bool_]]:
     """Return the tolerance at each state of a sum of ``count`` values, and whether it is small enough to show forces.
 
-    ``sizes`` (n,) are the absolute values of the sum.
+    ``values`` (n,) are those of the sum.
     """
-    largest = np.maximum.accumulate(sizes)
+    largest = np.maximum.accumulate(np.abs(values))
     noise = count * precision.quanta(largest) / 2
     tolerance = np.maximum(CONSTANT * largest + noise, np.finfo(float).tiny)
     shows_forces = (noise <= TOLERANCE * largest) & (largest > 0)

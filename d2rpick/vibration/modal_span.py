@@ -49,7 +49,8 @@ def find_described(
     guess : Span or None
         Where the energy seems to keep its level [time].
     """
-    for window in _list_windows(history, td, guess):
+    windows = _list_windows(history, td, guess)
+    for window in windows:
         described = _grow_described(history, window)
         if described is not None:
             return described
@@ -108,11 +109,10 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
             yield inner
     first = float(history.time[0])
     last = float(history.time[-1])
-    yield from (
-        Span(first + share * (last - first), last)
-        for share in _BEGINNINGS
-        if first + share * (last - first) < td
-    )
+    for share in _BEGINNINGS:
+        beginning = first + share * (last - first)
+        if beginning < td:
+            yield Span(beginning, last)
 
 
 def identify_window(history: History, window: Span) -> ModalVibration | None:

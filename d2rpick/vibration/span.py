@@ -85,6 +85,90 @@ class Span(NamedTuple):
     end: float
 
 
+def limit_bounds(
+    bounds: Span, td: float, after: float | None, landing: float | None
+) -> Span:
+    """Return bounds that begin at the end of the load and end at the landing, as far as they are given [time].
+
+    They always contain td.
+    """
+    if after is not None:
+        bounds = bounds._replace(start=min(after, td))
+    if landing is not None:
+        bounds = bounds._replace(end=max(min(bounds.end, landing), td))
+    return bounds
+
+
+def find_oscillator(
+    history: History,
+    td: float,
+    bounds: Span,
+    *,
+    oscillator: Mode | None = None,
+    fit_window: tuple[float, float] | None = None,
+    whole: bool = False,
+    quick: bool = False,
+) -> tuple[Span | None, Identification]:
+    """Return the window around ``td`` that an oscillator describes, and its fit: given, or else identified.
+
+    Parameters
+    ----------
+    history : History
+    td : float
+        [time]
+    bounds : Span
+        The part of the record to search [time].
+    oscillator, fit_window : optional
+        Given by the user: the oscillator itself, or the window to which it is fitted [time].
+    whole, quick : bool
+        As in `find_described_span`.
+
+    Returns
+    -------
+    span : Span or None
+        None when no oscillator describes the record around td or before.
+    fit : Identification
+        The accepted fit, with the share of a hidden mode, or the reason why none is accepted.
+    """
+    if fit_window:
+        fit = identify(*history.between(*fit_window))
+        span = find_span(history, td, fit, bounds) if fit.describes_record else None
+        return span, _add_what_is_hidden(history, fit, span)
+    if oscillator:
+        return find_described_span(history, td, bounds, oscillator, whole=whole)
+    longest_fit = find_longest_described(history, bounds, whole)
+    if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
+        span, fit = longest_fit
+    else:
+        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
+    return span, _add_what_is_hidden(history, fit, span)
+
+
+def _add_what_is_hidden(
+    history: History, fit: Identification, span: Span | None
+) -> Identification:
+    """Add to an accepted fit what a further mode, hidden in the residuals of the fit or of the ``span``, may have."""
+    if not fit.describes_record or fit.mode is None:
+        return fit
+    described = span or Span(fit.start, fit.end)
+    return _estimate_what_is_hidden(history, described, fit.rms, fit=fit)
+
+
+@remember
+def _estimate_what_is_hidden(
+    history: History, described: Span, _: float, *, fit: Identification
+) -> Identification:
+    """Return a fit with what is hidden; it is cached, so that situations can recognise that they share a fit."""
+    assert fit.mode is not None
+    share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
+    times, deviations = measure_deviations(*history.between(*described), fit)
+    return fit._replace(
+        hidden_share=max(fit.hidden_share, share),
+        deviation_times=times,
+        deviations=deviations,
+    )
+
+
 def find_described_span(
     history: History,
     td: float,
@@ -120,9 +204,11 @@ def find_described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    up_to_td = Span(bounds.start, _mark(td, bounds))
+    mark_of_td = _mark(bounds, td)
+    up_to_td = Span(bounds.start, mark_of_td)
+    windows = _list_windows_around(bounds, td, whole=whole)
     refused = {}
-    for window in _list_windows_around(td, bounds, whole=whole):
+    for window in windows:
         quickly = quick or window != up_to_td
         span, fit = _grow_span(history, td, window, bounds, oscillator, quick=quickly)
         if span:
@@ -145,8 +231,8 @@ def find_longest_described(
     beginnings = [start]
     ends = [end]
     if not whole:
-        beginnings.append(_mark(middle - _BEGINNINGS[0] * (middle - start), bounds))
-        ends.append(_mark(middle + _ENDS[0] * (end - middle), bounds, 1))
+        beginnings.append(_mark(bounds, middle - _BEGINNINGS[0] * (middle - start)))
+        ends.append(_mark(bounds, middle + _ENDS[0] * (end - middle), 1))
     windows = [Span(*window) for window in product(beginnings, ends)]
     for window in sorted(windows, key=lambda one: one.start - one.end):
         span, fit = _grow_span(history, middle, window, bounds, None, quick=True)
@@ -288,52 +374,47 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _list_windows_around(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
+def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Span]:
     """Yield windows to try: around td, the longest first, then before td."""
     start, end = bounds
-    beginnings = [
-        start,
-        *(
-            _mark(td - share * (td - start), bounds)
-            for share in (() if whole else _BEGINNINGS)
-        ),
-    ]
-    ends = [
-        end,
-        _mark(td, bounds),
-        *(
-            _mark(td + share * (end - td), bounds, 1)
-            for share in (() if whole else _ENDS)
-        ),
-    ]
+    mark_of_td = _mark(bounds, td)
+    beginnings = [start]
+    ends = [end, mark_of_td]
+    early_ends = []
+    if not whole:
+        for share in _BEGINNINGS:
+            beginning = _mark(bounds, td - share * (td - start))
+            beginnings.append(beginning)
+        for share in _ENDS:
+            late_end = _mark(bounds, td + share * (end - td), 1)
+            ends.append(late_end)
+        for share in _EARLIER_ENDS:
+            early_end = _mark(bounds, td - share * (td - start))
+            early_ends.append(early_end)
     around = {
         Span(beginning, late)
         for beginning in beginnings
         for late in ends
         if beginning < late
     }
-    around.add(Span(start, _mark(td, bounds)))
+    around.add(Span(start, mark_of_td))
     yield from sorted(around, key=lambda window: window.start - window.end)
-    if not whole:
-        for share in _EARLIER_ENDS:
-            early = _mark(td - share * (td - start), bounds)
-            yield from (
-                Span(beginning, early)
-                for beginning in dict.fromkeys(beginnings)
-                if beginning < early
-            )
+    for early_end in early_ends:
+        for beginning in dict.fromkeys(beginnings):
+            if beginning < early_end:
+                yield Span(beginning, early_end)
 
 
-def _mark(time: float, bounds: Span, after: int = 0) -> float:
-    """Return the last mark at or before ``time``, or the first ``after`` it; without a mark, return the time."""
-    if bounds.end > bounds.start:
-        share = (time - bounds.start) / (bounds.end - bounds.start)
-    else:
-        share = 0.0
-    if not 0 < share <= 1:
-        return time
-    exponent = ceil(log(share) / log(_MARKS)) - after
-    return bounds.start + (bounds.end - bounds.start) * _MARKS ** max(exponent, 0)
+def _mark(bounds: Span, time: float, after: int = 0) -> float:
+    """Return the last mark at or before ``time``, or the first ``after`` it; the ends of the bounds are marks too."""
+    start, end = bounds
+    if time <= start:
+        return start
+    if time >= end:
+        return end
+    share = (time - start) / (end - start)
+    marks_behind = ceil(log(share) / log(_MARKS))
+    return start + (end - start) * _MARKS ** max(marks_behind - after, 0)
 
 
 def _grow_span(

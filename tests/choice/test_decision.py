@@ -4,7 +4,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.choice.pair.grades import DO_NOT_USE, GRADES, VERDICTS
-from tests.command import ENERGY, GLSTAT, MATSUM, run_json
+from tests.command import ENERGY, GLSTAT, MATSUM, ROOT, run_json
 from tests.energies import require
 
 RUNS = [(ENERGY, ()), (GLSTAT, ()), (MATSUM, ("--part", "flying"))]
@@ -55,6 +55,25 @@ def test_nothing_is_verified_or_acceptable_whose_error_exceeds_a_half() -> None:
             assert not (exceeds_half and (candidate.acceptable or judged.verified))
             if exceeds_half:
                 assert judged.decision.verdict == DO_NOT_USE
+
+
+def test_a_cause_of_the_motion_is_not_excused_by_the_worth_of_the_vibration() -> None:
+    """Gravity that is not known makes the motion poor; the energy of the vibration error has nothing to do with it."""
+    table = d2.read(str(ROOT / "sample_data/rollover_box_excel.csv"))
+    decision = require(d2.suggest(table).decision)
+    quality = decision.quality
+    assert quality.motion.grade == "poor"
+    assert quality.alone.grade != quality.vibration.grade
+    for reason in (decision.reason, decision.general_reason):
+        assert "gravity" in reason
+        assert "next contact" not in reason
+
+
+@pytest.mark.parametrize("td", [0.064, 0.0698, 0.075])
+def test_the_general_reason_holds_no_number_of_the_pair(td: float) -> None:
+    decision = require(d2.suggest(d2.read(ENERGY), td).decision)
+    assert f"{decision.residual:.0%}" in decision.reason
+    assert f"{decision.residual:.0%}" not in decision.general_reason
 
 
 def test_a_poor_pair_names_the_pair_to_use_instead() -> None:

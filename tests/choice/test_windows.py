@@ -31,6 +31,7 @@ from d2rpick.flight.margin import (
     LEAST_MARGIN,
     changes_momentum_little,
     compute_margin,
+    estimate_grazing_spread,
     estimate_landing_spread,
     estimate_spread_of_vibration,
     is_grazing,
@@ -106,11 +107,13 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
         "no-contact",
         None,
         None,
+        None,
     )
     bare = make_energy_history(history.energy, history.time)
     assert compute_margin(bare, flight) == (
         LEAST_MARGIN * history.time[-1],
         "flight",
+        None,
         None,
         None,
     )
@@ -129,8 +132,8 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
     for turning in (2.0, -0.5 * speed):  # the rotation moves the surface that touches
         moved = estimate_landing_spread(history, flight, drift, turning)
         assert moved == pytest.approx(spread + drift / (speed + turning), rel=1e-6)
-    receding = estimate_landing_spread(history, flight, drift, -speed)
-    assert receding == pytest.approx(spread + drift / speed, rel=1e-6)
+    receding = estimate_landing_spread(history, flight, drift, -1.5 * speed)
+    assert receding == estimate_grazing_spread(history, flight, drift)
     margin_kept = compute_margin(history, flight, place=drift)
     assert margin_kept.time == max(
         LEAST_MARGIN * require(flight.end), require(margin_kept.spread)

@@ -751,10 +751,65 @@ def test_findings_are_rows_of_csv_and_markdown_too() -> None:
         run("check", DECK, "--history", GLSTAT, "-f", form).stdout
         for form in ("csv", "markdown")
     )
-    assert [row["rule"] for row in DictReader(csv.splitlines())] == [
+    csv_rows = [*DictReader(csv.splitlines())]
+    assert [row["rule"] for row in csv_rows if row["rule"]] == [
         finding_row["rule"] for finding_row in check_report
     ]
+    assert all(row["severity"] == "info" for row in csv_rows if not row["rule"])
     rows = [line.split(" | ") for line in markdown.splitlines() if "D2R" in line]
     assert [row[0].strip("| ") for row in rows] == [
         finding_row["rule"] for finding_row in check_report
     ]
+
+
+@pytest.mark.parametrize(
+    "form", ["table", "json", "ndjson", "csv", "markdown", "github", "junit", "sarif"]
+)
+def test_every_format_has_the_verdict_on_each_pair_with_reason_and_cure(
+    form: str,
+) -> None:
+    """A pair that is good or fair has no finding, but its reader must learn the verdict too."""
+    judged = [
+        run_json("verify", "--tr", repr(window["tr"]), "--td", repr(window["td"]), ENERGY)
+        for window in run_json("check", DECK)["windows"]
+    ]  # fmt: skip
+    assert [answer["verdict"] for answer in judged] == ["use", "do not use"]
+    text = run("check", "-f", form, "--history", ENERGY, DECK).stdout
+    text = " ".join(text.replace("%25", "%").split())
+    for part, answer in zip((11, 12), judged, strict=True):
+        assert answer["verdict_reason"] in text
+        assert answer["cure"] in text
+        if form not in ("json", "ndjson", "sarif"):
+            assert f"{answer['verdict']}: part {part}: rigid from " in text
+    for document in [run_json("check", "--history", ENERGY, DECK)]:
+        assert [
+            (window["verdict"], window["verdict_reason"], window["cure"])
+            for window in document["windows"]
+        ] == [
+            (answer["verdict"], answer["verdict_reason"], answer["cure"])
+            for answer in judged
+        ]
+
+
+def test_a_fair_pair_passes_and_its_verdict_comes_before_any_finding() -> None:
+    pair = run_json("suggest", "--part", "1,2", "--no-deck", MATSUM)
+    assert pair["verdict"] == "use with care"
+    tr, td = pair["recommended"]["tr"], pair["recommended"]["td"]
+    deck = run(
+        "card", "--tr", f"{tr:.7g}", "--td", f"{td:.7g}", "--part", "1,2"
+    ).stdout  # fmt: skip
+    place("fair.k", f"*KEYWORD\n{deck}*END\n")
+    result = run("check", "fair.k", "--history", MATSUM)
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert lines[1].startswith("  use with care: parts 1, 2: rigid from ")
+    assert lines[2].startswith("    why         the vibration after td is wrong by ")
+    assert any(line.startswith("    to improve  ") for line in lines[3:8])
+
+
+def test_without_a_history_no_window_has_a_verdict() -> None:
+    for window in run_json("check", DECK)["windows"]:
+        assert (window["verdict"], window["verdict_reason"], window["cure"]) == (
+            None,
+        ) * 3
+    assert "use" not in run("check", DECK).stdout

@@ -234,3 +234,53 @@ def test_what_would_be_better_is_the_pair_that_suggest_names() -> None:
     assert (
         cures == [["use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%"]] * 2
     )
+
+
+def test_the_first_line_is_the_pair_that_suggest_and_plan_choose() -> None:
+    chosen = ("--part", "1,2", "--no-deck", "-q", MATSUM)
+    suggested = run_json("suggest", *chosen[:3], MATSUM)
+    pair = suggested["recommended"]
+    times = f"tr = {pair['tr']:.6g}, td = {pair['td']:.6g}"
+    explored = run("explore", *chosen).stdout
+    first = explored.splitlines()[0]
+    assert first.startswith(f"{suggested['verdict']}  {times}, residual ")
+    assert run("plan", *chosen).stdout.startswith(f"{suggested['verdict']}: ")
+    answer = run_json("explore", *chosen[:3], MATSUM)["answer"]
+    assert answer.startswith(f"{suggested['verdict']}: {times}")
+    assert "best pair" not in explored
+
+
+def test_a_smaller_error_and_a_longer_rigid_time_are_shown_with_what_they_cost() -> (
+    None
+):
+    options = ("explore", "--part", "1,2", "--no-deck", "-q", MATSUM)
+    lines = run(*options).stdout.splitlines()
+    named = {line[:13].strip(): line[15:] for line in lines}
+    offers = run_json(*options[:4], MATSUM)["offers"]
+    (chosen,) = (offer for offer in offers if offer["recommended"])
+    offers = [offer for offer in offers if offer["error"] is not None]
+    smallest = min(offers, key=lambda offer: round(offer["error"], 3))
+    longest = max(offers, key=lambda offer: offer["rigid_time"])
+    lost = 1 - smallest["rigid_time"] / chosen["rigid_time"]
+    gained = longest["rigid_time"] / chosen["rigid_time"] - 1
+    assert named["smaller error"] == (
+        f"td = {smallest['td']:.6g} with residual {smallest['error']:.3f} costs {lost:.1%} of the rigid time"
+    )
+    assert named["longest"] == (
+        f"td = {longest['td']:.6g} with residual {longest['error']:.3f} makes the rigid time {gained:.1%} longer"
+    )
+
+
+def test_a_table_names_each_reason_once_below_it() -> None:
+    lines = run("explore", "--td", "0.064", "--steps", "40", ENERGY).stdout.splitlines()
+    numbered = [line for line in lines if line.startswith("(")]
+    assert [line.split()[0] for line in numbered] == [
+        f"({number})" for number in range(1, len(numbered) + 1)
+    ]
+    assert len(numbered) == len(set(numbered))
+    table = lines[lines.index("") : lines.index(numbered[0])]
+    used = {row.split()[-1] for row in table if row.endswith(")") and "(" in row}
+    assert {line.split()[0] for line in numbered} == used & {
+        f"({number})" for number in range(9)
+    }
+    assert all("wrong by" not in row for row in table)

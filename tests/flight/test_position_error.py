@@ -307,7 +307,7 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
     None
 ):
     history = read_solved("carT01.gz", "1-17").history
-    flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    flight = find_flight(history, find_seen_flight(history, 0.14), None, None)
     drift_found = require(find_drift_in_flight(history, flight))
     assert drift_found.part.title == "engine"
     assert drift_found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(
@@ -317,7 +317,7 @@ def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show()
     assert find_drift_in_flight(history, flight._replace(parts=None)) is None
     assert (
         find_drift_in_flight(
-            history, find_flight(history, 0.2, find_seen_flight(history, 0.2), None)
+            history, find_flight(history, find_seen_flight(history, 0.2), None, None)
         )
         is None
     )
@@ -392,7 +392,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 @cache
 def read_car(parts: str) -> tuple[History, Flight]:
     history = read_solved("carT01.gz", parts).history
-    return history, find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    return history, find_flight(history, find_seen_flight(history, 0.14), None, None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:

@@ -284,5 +284,5 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
 @cache
 def find_drift_of_car(parts: tuple[str, ...], where: Placement) -> Drift:
     history = read_solved("carT01.gz", *parts).history
-    flight = find_flight(history, 0.14, find_seen_flight(history, 0.14), None)
+    flight = find_flight(history, find_seen_flight(history, 0.14), None, None)
     return require(find_drift_in_flight(history, flight, None, where))

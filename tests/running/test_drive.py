@@ -579,4 +579,4 @@ def test_a_command_that_is_corrected_is_not_one_that_has_begun(tmp_path: Path) -
         starter=give_solver_command("starter"),
         engine=give_solver_command("engine"),
     ).driver(resume=False) as driver:
-        assert not driver.legs
+        assert not driver.journal.legs

@@ -16,6 +16,7 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
+from d2rpick.running.events import find_events
 from d2rpick.running.evidence import GrowingEvidence, highest_energy
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.witness import Quiet
@@ -65,12 +66,12 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    quiet_spans = find_quiet_times(history, follow_inner_motion(history).needed)
+    quiet_spans = find_quiet_times(history, follow_inner_motion(history).wait)
     assert list_spans(quiet_spans)[: len(expected)] == pytest.approx(
         np.array(expected), abs=5e-4
     )
     assert all(
-        span.seen - span.start >= span.wait and span.left <= 1e-4
+        span.seen - span.start >= span.wait.time and span.left <= 1e-4
         for span in quiet_spans
     )
     assert all(span.gravity == pytest.approx(9.81, rel=5e-3) for span in quiet_spans)
@@ -80,9 +81,9 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
     """The longest cycle of the box contains a push at 302 ms and lasts 24 ms; half the spring period is 17 ms."""
     for earlier_wait in (None, Wait(0.018, "record", "as in the flight before")):
         waits = [
-            wait.wait
-            for wait in find_quiet_times(
-                record(BOX), follow_inner_motion(record(BOX), None, earlier_wait).needed
+            span.wait.time
+            for span in find_quiet_times(
+                record(BOX), follow_inner_motion(record(BOX), None, earlier_wait).wait
             )
         ]
         assert all(0.016 <= wait <= 0.021 for wait in waits[1:])
@@ -90,25 +91,26 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
 
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
-    history = record(name)
     with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
-        find_quiet_times(history, follow_inner_motion(history, 0.002).needed)
+        find_events(*take_whole_record(record(name), 0.002))
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
     history = cut_history(record(CAR), 0.14)
-    last = find_quiet_times(history, follow_inner_motion(history, 0.022).needed)[-1]
+    evidence, motion = take_whole_record(history, 0.022)
+    assert find_events(evidence, motion)
+    last = evidence.flights(motion.wait)[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
-    assert last.wait == 0.022
+    assert last.wait.time == 0.022
 
 
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    quiet_spans = find_quiet_times(history, follow_inner_motion(history).needed)
+    quiet_spans = find_quiet_times(history, follow_inner_motion(history).wait)
     for time in history.time[[300, 640, 900]].tolist():
         early = cut_history(history, time)
-        early_spans = find_quiet_times(early, follow_inner_motion(early).needed)
+        early_spans = find_quiet_times(early, follow_inner_motion(early).wait)
         assert [span[:2] for span in early_spans] == [
             span[:2] for span in quiet_spans if span.seen <= time
         ]
@@ -116,15 +118,15 @@ def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
 
 def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3)))
-    assert take_whole_record(switched)[0].contact_after(0.0) == pytest.approx(
+    assert take_whole_record(switched)[0].find_contact() == pytest.approx(
         0.2858, abs=4e-4
     )
-    assert take_whole_record(record("car_all_T02.gz"))[0].contact_after(0.05) is None
+    assert take_whole_record(record("car_all_T02.gz"))[0].find_contact() is None
 
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    quiet_spans = find_quiet_times(switched, follow_inner_motion(switched).needed)
+    quiet_spans = find_quiet_times(switched, follow_inner_motion(switched).wait)
     assert list_spans(quiet_spans)[:2] == pytest.approx(
         np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3
     )
@@ -142,12 +144,12 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     listed = np.array(
         [flight.within(history.time) for flight in find_flights(history, Settings())]
     )
-    for flight in find_quiet_times(history, follow_inner_motion(history).needed):
+    for flight in find_quiet_times(history, follow_inner_motion(history).wait):
         flight_times = (
             flight.start,
             history.time[-1] if flight.end is None else flight.end,
         )
-        if flight_times[1] - flight.start < 2 * flight.wait:
+        if flight_times[1] - flight.start < 2 * flight.wait.time:
             continue  # info lists no flight as short as this beside the others
         assert np.abs(listed - flight_times).max(axis=1).min() <= 3 * history.step
 
@@ -159,14 +161,14 @@ def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
     )
     (span,) = (
         q
-        for q in find_quiet_times(rising, follow_inner_motion(rising).needed)
+        for q in find_quiet_times(rising, follow_inner_motion(rising).wait)
         if q.start < 0.2
     )
     assert span.level is not None
     assert span.level - span.start == pytest.approx(0.31, rel=0.02)
     assert all(
         q.level is None
-        for q in find_quiet_times(record(BOX), follow_inner_motion(record(BOX)).needed)
+        for q in find_quiet_times(record(BOX), follow_inner_motion(record(BOX)).wait)
         if q.start < 0.6
     )
 
@@ -214,7 +216,7 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(
 ) -> None:
     """Its first states are within the remaining force, later ones are not: the flight begins later, and continues."""
     history = make_pushed_body(round(tail, 4), round(share, 4))
-    (flight,) = find_quiet_times(history, lambda *_: wait)
+    (flight,) = find_quiet_times(history, lambda *_: Wait(wait, "given", "as given"))
     assert 0.02 <= flight.start <= 0.05
     assert flight.seen <= 0.05 + wait
     assert flight.end == pytest.approx(0.17, abs=8e-4)
@@ -240,8 +242,8 @@ def test_what_is_seen_does_not_depend_on_when_somebody_looked(
         part = take_states(history, states)
         evidence.take(part)
         grown.take(part, evidence)
-        evidence.flights(grown.needed)
-    assert evidence.flights(grown.needed) == whole.flights(motion.needed)
+        evidence.flights(grown.wait)
+    assert evidence.flights(grown.wait) == whole.flights(motion.wait)
     assert [witness.free for witness in evidence.witnesses] == [
         witness.free for witness in whole.witnesses
     ]

@@ -92,7 +92,7 @@ def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(
     for age, expected in ((50, []), (70, ["silent"]), (100, []), (150, ["silent"])):
         then = time.time() - age
         os.utime(folder / "runT01", (then, then))
-        watch._files = [(name, os.stat(name)) for name, _ in watch._files]  # noqa: PTH116  written then
+        watch._files = {name: os.stat(name) for name in watch._files}  # noqa: PTH116  written then
         assert list_news(watch) == expected
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import bound_mean_energy
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.pair.quality import grade_pair
+from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR, grade_pair
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -95,7 +95,29 @@ class Decision(NamedTuple):
         reasons = "; ".join(self.quality.reasons)
         if not reasons:
             return _explain_why_good(self.quality, self.residual)
-        return f"{reasons}{_explain_raised_grade(self.quality)}"
+        if self.is_limited_by_raised_grade:
+            return f"{reasons}{_explain_raised_grade(self.quality)}"
+        return reasons
+
+    @property
+    def general_reason(self) -> str:
+        """Reason for a verdict that is not "use", without the numbers of this pair: what several pairs can share."""
+        if self.objections:
+            return "; ".join(self.objections)
+        reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
+        if self.is_limited_by_raised_grade:
+            limit = (
+                f"at most {MOST_WORTH_OF_FAIR:.0%} of the energy of the next contact"
+            )
+            return f"{reasons}, but this is {limit}"
+        return reasons
+
+    @property
+    def is_limited_by_raised_grade(self) -> bool:
+        """True if the vibration keeps the verdict from being better, though its grade was raised already."""
+        vibration = self.quality.vibration
+        is_raised = self.quality.alone.grade != vibration.grade
+        return is_raised and vibration.grade == self.grade
 
     @property
     def expected(self) -> str:

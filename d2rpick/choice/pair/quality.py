@@ -47,9 +47,12 @@ _MOST_HIDDEN: Final = 0.3
 # An energy has crossed its mean once it exceeds it by this share of the standard deviation. Less may be noise.
 _BAND: Final = 0.25
 # Limits of the energy of the vibration error, as a share of the energy of the next contact [-].
-# A pair below _HARDLY_GOOD is good, a pair below _HARDLY_FAIR is fair (docs/explanation/validation-vibration.md).
-_HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
+# A pair below _HARDLY_GOOD is good, a pair below MOST_WORTH_OF_FAIR is fair
+# (docs/explanation/validation-vibration.md).
+_HARDLY_GOOD: Final = 0.01
+MOST_WORTH_OF_FAIR: Final = 0.05
 _NAMED: Final = 5  # largest number of parts that a sentence names
+_WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
@@ -186,12 +189,19 @@ def list_exceeded_limits(
 class Cause(NamedTuple):
     """The ``reason`` why a grade is not better, and the ``cure`` that would improve it.
 
-    ``needs_other_times``: the cure is another tr or td.
+    ``needs_other_times``: the cure is another tr or td.  ``kind`` is the reason without the numbers of this pair,
+    by default the reason itself; with it a table explains once what several pairs have in common.
     """
 
     reason: str
     cure: str
     needs_other_times: bool = False
+    kind: str = ""
+
+    @property
+    def general_reason(self) -> str:
+        """The reason without the numbers of this pair."""
+        return self.kind or self.reason
 
 
 _NOT_CERTAIN: Final = Cause(
@@ -290,7 +300,7 @@ def grade_pair(situation: Situation, best: Candidate) -> Quality:
 
 def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     """Raise the grade of a vibration whose error hardly matters in the next contact."""
-    if worth is None or alone.grade == "good" or worth.share > _HARDLY_FAIR:
+    if worth is None or alone.grade == "good" or worth.share > MOST_WORTH_OF_FAIR:
         return alone
     if worth.share <= _HARDLY_GOOD:
         return Grade("good")
@@ -315,9 +325,11 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     """Return the cause "the directions of the deformation at tr and td are unknown", with its ``cure``."""
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
+    unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
     return Cause(
-        f"it is unknown whether the parts are deformed in the same direction at tr and td{why}",
+        f"{unknown}{why}",
         f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
+        kind=unknown,
     )
 
 
@@ -342,11 +354,13 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
             reason,
             "look for another tr or td with d2rpick explore",
             needs_other_times=True,
+            kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}",
         )
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
         "look for another td with d2rpick explore",
         needs_other_times=True,
+        kind="most of the vibration energy is kinetic at td, which no tr can keep",
     )
 
 
@@ -371,6 +385,7 @@ def _list_causes_of_record(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
                 "write the energies more often",
+                kind=f"the record has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )
     return tuple(causes)
@@ -407,6 +422,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
                 "look for another td with d2rpick explore",
                 needs_other_times=True,
+                kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )
         )
     elif high > _MOST_HIDDEN:
@@ -414,6 +430,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
             Cause(
                 f"the vibration after td may be wrong by up to {high:.0%}, because the record may hide a further mode",
                 _describe_cure_for_modes(situation),
+                kind="the record may hide a further mode",
             )
         )
     if best.residual <= MOST_GOOD and _is_loose(best):
@@ -422,6 +439,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
             Cause(
                 f"tr is known only to ±{reach:.1g}, but its timing tolerance is ±{best.timing_tolerance:.1g}",
                 "write the energies more often, and with more digits",
+                kind="tr is less accurate than its timing tolerance demands",
             )
         )
     return causes

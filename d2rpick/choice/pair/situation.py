@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,17 +13,13 @@ from d2rpick.base.errors import RangeError
 from d2rpick.base.memory import remember
 from d2rpick.choice.pair.together import PartsTogether
 from d2rpick.choice.parts.margins import find_drift_of_bodies, find_margin
-from d2rpick.flight.chosen import Described, end_flight_at, find_flight, start_flight_at
+from d2rpick.flight.chosen import Described, choose_flight
 from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.histories.digits import sum_times_as_read
 from d2rpick.vibration import find_models, find_part_signs
-from d2rpick.vibration.identify import (
-    MIN_SAMPLES_PER_PERIOD,
-    Identification,
-    identify,
-)
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.model import (
     Evidence,
     Vibration,
@@ -33,23 +28,19 @@ from d2rpick.vibration.model import (
     is_doubtful,
     model_at,
 )
-from d2rpick.vibration.span import (
-    Span,
-    estimate_hidden_share,
-    find_described_span,
-    find_longest_described,
-    find_span,
-    measure_deviations,
-)
+from d2rpick.vibration.span import Span, find_oscillator, limit_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.choice.question import Settings
+    from d2rpick.flight.internal_energy import QuietTime
     from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration import SignedModel
+    from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.modal_span import ModalWindow
 
     Look = Callable[[float], "Situation"]
 
@@ -290,11 +281,43 @@ def examine_td(
         fitted_at = (seen.flight.start + seen.flight.end) / 2
     else:
         fitted_at = td
-    fit, span = _find_oscillator(history, fitted_at, settings, seen, quick=quick)
-    described = _skip_first_quarter(history, fit, span) or _find_window_of_modes(
-        history, td, settings, seen
+    is_shown = seen.flight is not None or seen.refusal is not None
+    span: Span | None = None
+    fit: Identification | None = None
+    if settings.replay:
+        bounds = limit_bounds(
+            _get_bounds(history, seen), fitted_at, settings.after, settings.landing
+        )
+        span, fit = find_oscillator(
+            history,
+            fitted_at,
+            bounds,
+            oscillator=settings.oscillator,
+            fit_window=settings.fit_window,
+            whole=is_shown,
+            quick=quick,
+        )
+    described = _skip_first_quarter(history, fit, span)
+    quiet: QuietTime | None = None
+    if described is None and not is_shown:
+        # Only the energy can show a flight.
+        quiet = find_quiet_time(history, td)
+        if settings.replay:
+            # Imported here to keep start-up fast.
+            from d2rpick.vibration.modal_span import find_described
+
+            guess = _get_quiet_window(history, quiet)
+            modes = find_described(history, td, guess)
+            described = _describe_by_modes(modes)
+    flight = choose_flight(
+        history,
+        td,
+        seen,
+        described,
+        quiet,
+        after=settings.after,
+        landing=settings.landing,
     )
-    flight = _find_flight_at(history, td, settings, seen, described)
     is_given = settings.oscillator is not None
     is_prescribed = is_given or settings.fit_window is not None
     evidence = Evidence(fit, span, is_given, prescribed=is_prescribed)
@@ -324,6 +347,8 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
         history.check(settings.after, argument="after")
     if settings.landing is not None:
         history.check(settings.landing, argument="landing")
+    if settings.replay and settings.fit_window:
+        history.check(*settings.fit_window, argument="fit_window")
 
 
 def _find_other_models(
@@ -388,122 +413,27 @@ def _limit_start(situation: Situation, since: float) -> Situation:
     return replace(situation, flight=flight._replace(start=since))
 
 
-def _find_flight_at(
-    history: History,
-    td: float,
-    settings: Settings,
-    evidence: Seen,
-    described: Described | None,
-) -> Flight:
-    """Return the flight around td, from the evidence or given by the user; supported parts never fly."""
-    flight = find_flight(history, td, evidence, described)
-    if evidence.held:
-        return flight
-    if settings.after is not None:
-        flight = start_flight_at(history, flight, td, settings.after, described)
-    if settings.landing is not None:
-        flight = end_flight_at(history, flight, td, settings.landing)
-    return _limit_by_supports(history, flight, td)
+def _get_bounds(history: History, seen: Seen) -> Span:
+    """Return the flight that the evidence shows, or else the whole record [time]."""
+    if seen.flight:
+        return Span(seen.flight.start, seen.flight.end)
+    return Span(float(history.time[0]), float(history.time[-1]))
 
 
-def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Limit a flight to the time in which no support holds the parts.
-
-    A flight that was found from the part momenta is already limited in this way.
-    """
-    if flight.start is None or flight.refusal or flight.by_parts:
-        return flight
-    start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
-    end = min(end, inf if flight.end is None else flight.end)
-    return flight._replace(
-        start=max(start, flight.start), end=None if end == inf else end
-    )
-
-
-def _find_oscillator(
-    history: History,
-    td: float,
-    settings: Settings,
-    evidence: Seen,
-    *,
-    quick: bool,
-) -> tuple[Identification | None, Span | None]:
-    """Return the given or the identified oscillator, and the window around td that it describes."""
-    if not settings.replay:
-        return None, None
-    whole = bool(evidence.flight or evidence.refusal)
-    if evidence.flight:
-        bounds = Span(*evidence.flight[:2])
-    else:
-        bounds = Span(float(history.time[0]), float(history.time[-1]))
-    if settings.after is not None:
-        bounds = bounds._replace(start=min(settings.after, td))
-    if settings.landing is not None:
-        bounds = bounds._replace(end=max(min(bounds.end, settings.landing), td))
-    if settings.fit_window:
-        history.check(*settings.fit_window, argument="fit_window")
-        fit = identify(*history.between(*settings.fit_window))
-        span = find_span(history, td, fit, bounds) if fit.describes_record else None
-        return _add_what_is_hidden(history, fit, span), span
-    if settings.oscillator:
-        span, fit = find_described_span(
-            history, td, bounds, settings.oscillator, whole=whole
-        )
-        return fit, span
-    longest_fit = find_longest_described(history, bounds, whole)
-    if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
-        span, fit = longest_fit
-    else:
-        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
-    return _add_what_is_hidden(history, fit, span), span
-
-
-def _find_window_of_modes(
-    history: History, td: float, settings: Settings, evidence: Seen
-) -> Described | None:
-    """Return a window described by modes if only the energy can show a flight, otherwise None."""
-    if evidence.flight or evidence.refusal or not settings.replay:
-        return None
-    # Imported here to keep start-up fast.
-    from d2rpick.vibration.modal_span import (
-        find_described,
-    )
-
-    quiet = find_quiet_time(history, td)
-    last = float(history.time[-1])
+def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
+    """Return the window in which the energy shows no load, up to the end of the record if no contact is seen."""
     if quiet is None:
-        guess = None
-    else:
-        guess = Span(quiet.start, last if quiet.end is None else quiet.end)
-    described = find_described(history, td, guess)
-    if described is None:
         return None
-    return Described(*described.span, described.vibration.vibration_energy)
-
-
-def _add_what_is_hidden(
-    history: History, fit: Identification, span: Span | None
-) -> Identification:
-    """Add to an accepted fit what a further mode, hidden in the residuals of the fit or of the ``span``, may have."""
-    if not fit.describes_record or fit.mode is None:
-        return fit
-    described = span or Span(fit.start, fit.end)
-    return _estimate_what_is_hidden(history, described, fit.rms, fit=fit)
-
-
-@remember
-def _estimate_what_is_hidden(
-    history: History, described: Span, _: float, *, fit: Identification
-) -> Identification:
-    """Return a fit with what is hidden; it is cached, so that situations can recognise that they share a fit."""
-    assert fit.mode is not None
-    share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
-    times, deviations = measure_deviations(*history.between(*described), fit)
-    return fit._replace(
-        hidden_share=max(fit.hidden_share, share),
-        deviation_times=times,
-        deviations=deviations,
+    return Span(
+        quiet.start, float(history.time[-1]) if quiet.end is None else quiet.end
     )
+
+
+def _describe_by_modes(modes: ModalWindow | None) -> Described | None:
+    """Return the window that modes describe, with the energy of their vibration; None without modes."""
+    if modes is None:
+        return None
+    return Described(*modes.span, modes.vibration.vibration_energy)
 
 
 def _skip_first_quarter(

@@ -165,6 +165,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
         )
     yield from _warn_about_grazing(situation)
+    yield from _warn_about_unknown_rotation(situation)
     if td > situation.latest_td and not flight.refusal:
         yield Caution(
             "td-after-contact",
@@ -176,23 +177,41 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
     """Yield a warning, with the earliest contact time, if the body only grazes the contact that ends the flight."""
     flight = situation.flight
     margin = situation.expected_margin
-    if (
-        flight.end is None
-        or flight.start is None
-        or flight.refusal
-        or margin.source != "grazing"
-    ):
+    if flight.end is None or flight.refusal or margin.source != "grazing":
         return
     grazed = f"the force of the contact at {flight.end:.6g} is at first below 1 % of its maximum"
     if margin.grazing == "momentum":
         grazed = f"the contact at {flight.end:.6g} takes less than 10 % of the momentum towards it"
-    early = min(margin.time, flight.end - flight.start)
-    moved = f"the body only grazes it, so a position error at td makes it come up to {early:.2g} earlier"
-    if early < flight.end - flight.start:
-        advice = f"keep td before {round_down_as_read(flight.end - early):.6g}"
+    moved = "the body only grazes it, so a position error at td makes it come up to"
+    yield Caution(
+        "grazing-contact", f"{grazed}: {moved} {_describe_early_contact(situation)}"
+    )
+
+
+def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
+    """Yield a warning if nothing shows how the body turns and its rotation may make the next contact earlier."""
+    flight = situation.flight
+    margin = situation.expected_margin
+    if flight.end is None or flight.refusal or margin.rotation is None:
+        return
+    unknown = "nothing shows how the body turns, and its kinetic energy may be that of a rotation"
+    slow = "which slows the surface that touches first"
+    moved = f"a position error at td makes the contact at {flight.end:.6g} come"
+    early = f"up to {_describe_early_contact(situation)}"
+    if margin.rotation == "unseen":
+        early = f"earlier than the margin of {margin.time:.2g}; give the deck (`deck`), which shows the rotation"
+    yield Caution("rotation-unknown", f"{unknown} {slow}: {moved} {early}")
+
+
+def _describe_early_contact(situation: Situation) -> str:
+    """Describe how much earlier the contact may come, and the last td before that."""
+    start, end = situation.flight.within(situation.history.time)
+    early = min(situation.expected_margin.time, end - start)
+    if early < end - start:
+        advice = f"keep td before {round_down_as_read(end - early):.6g}"
     else:
         advice = "no td in this flight is safe"
-    yield Caution("grazing-contact", f"{grazed}: {moved}; {advice}")
+    return f"{early:.2g} earlier; {advice}"
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
@@ -249,7 +268,9 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
     )
     if worst.assumed and situation.settings.bodies is None:
         assumption += ", which the deck of the run shows (`deck`)"
-    turning = compute_turning_speed(situation.history, situation.flight, bodies)
+    turning = compute_turning_speed(
+        situation.history, situation.flight, bodies, situation.settings.placement
+    )
     contact = compute_margin(
         situation.history, situation.flight, place=worst.error, turning=turning
     ).spread

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.memory import remember
+from d2rpick.flight.deformable_again import restore_parts
 from d2rpick.flight.margin import (
     Margin,
     compute_margin,
@@ -28,6 +29,7 @@ def find_drift_of_bodies(
     history: History, flight: Flight, settings: Settings
 ) -> Bodies | None:
     """Return the drift of the rigid bodies of the parts in a flight; None without data of parts."""
+    history, flight = restore_parts(history, flight)
     if flight.parts is None:
         return None
     return _compute_drift(history, flight, settings.bodies, settings.placement)
@@ -53,27 +55,50 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
     """Return the given margin, or the time by which a switch in the flight may make the contact earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
+    history, flight = restore_parts(history, flight)
     bodies = find_drift_of_bodies(history, flight, settings)
     if bodies is None:
         return compute_margin(history, flight)
-    position_error = _find_largest_position_error(bodies, flight.start, flight.end)
-    turning = compute_turning_speed(history, flight, bodies)
-    return compute_margin(history, flight, place=position_error, turning=turning)
+    times = np.linspace(*flight.within(history.time), _TIMES)[:-1]
+    direction = find_direction_of_approach(history, flight)
+    position_error = bodies.find_largest_error(times, direction)
+    turning = compute_turning_speed(history, flight, bodies, settings.placement)
+    margin = compute_margin(history, flight, place=position_error, turning=turning)
+    is_known = direction is None or bodies.compute_speed_at_front(direction) is not None
+    if is_known or margin.source == "no-contact":
+        return margin
+    return margin._replace(
+        rotation=_judge_rotation(history, flight, margin, position_error)
+    )
 
 
-def compute_turning_speed(history: History, flight: Flight, bodies: Bodies) -> float:
+def _judge_rotation(
+    history: History, flight: Flight, margin: Margin, position_error: float | None
+) -> str | None:
+    """Return how an unknown rotation of the bodies affects a ``margin``, see `Margin`."""
+    from d2rpick.flight.turning_bound import may_turn_back
+
+    if margin.time > compute_margin(history, flight, place=position_error).time:
+        return "any"
+    return "unseen" if position_error and may_turn_back(history, flight) else None
+
+
+def compute_turning_speed(
+    history: History, flight: Flight, bodies: Bodies, placement: Placement | None
+) -> float | None:
     """Return the speed that the rotation of the bodies adds at the points where they touch a contact [length/time].
 
-    0 if the momenta do not show a direction, or no deck shows how the bodies turn.
+    If the deck gives the places of the parts but nothing shows how the bodies turn, it is the least speed that the
+    kinetic energy allows.  None without a deck, or if the momenta do not show a direction.
     """
+    from d2rpick.flight.turning_bound import bound_turning_speed
+
+    history, flight = restore_parts(history, flight)
     direction = find_direction_of_approach(history, flight)
-    return 0.0 if direction is None else bodies.compute_speed_at_front(direction)
-
-
-def _find_largest_position_error(
-    bodies: Bodies, start: float, end: float
-) -> float | None:
-    """Return the largest position error of a body at the end of a flight [length]; None if it is unknown."""
-    errors = bodies.errors(np.linspace(start, end, _TIMES)[:-1], end)
-    known_errors = errors[np.isfinite(errors)]
-    return float(known_errors.max()) if known_errors.size else None
+    if direction is None:
+        return None
+    speed = bodies.compute_speed_at_front(direction)
+    if speed is not None or placement is None:
+        return speed
+    largest = bound_turning_speed(history, flight, placement)
+    return None if largest is None else -largest

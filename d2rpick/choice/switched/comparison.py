@@ -166,28 +166,15 @@ def compare_runs(
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    energies_after = switched.between(td, end)[1]
     reference_after = reference.between(td, end)[1]
-    _check_number_of_states(
-        reference, switched, min(energies_after.size, reference_after.size), td, end
-    )
-    energies_before = switched.energy[switched.time < td]
-    energies_to_end = switched.between(td, np.inf)[1]
-    if (
-        energies_before.size
-        and energies_after[0] == energies_before[-1]
-        and _is_reported_wrong(energies_before[-1], energies_to_end[1:])
-    ):
-        energies_after = energies_after[1:]
-        # The solver switches at the first step from td on, so the parts were still rigid in this state.
-        energies_to_end = energies_to_end[1:]
+    states = min(switched.between(td, end)[1].size, reference_after.size)
+    _check_number_of_states(reference, switched, states, td, end)
+    energies_after, energy_rigid = _select_energies_after(switched, td, end)
     frozen = float(energies_after[0])
     energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
-    if energies_before.size and _is_reported_wrong(
-        energies_before[-1], energies_to_end
-    ):
-        reported = f"the solver reports an energy of {energies_before[-1]:.6g} while the parts are rigid"
+    if energy_rigid is not None:
+        reported = f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
         notes.append(
             f"{reported}; it is not used, because some solvers report wrong energies of rigid solid elements; "
             f"right after td the energy is {frozen:.6g}"
@@ -195,7 +182,8 @@ def compare_runs(
     still = _find_limit_of_change(reference, switched, tr, td)
     error = _compute_relative_distance(*momenta, td, end)
     rigid = _find_rigid_window(switched, tr, td, still)
-    mean, mean_reference = float(energies_after.mean()), float(reference_after.mean())
+    mean = float(energies_after.mean())
+    mean_reference = float(reference_after.mean())
     objections = [*_check_rigid_window(reference, switched, rigid, tr, td, still)]
     if is_reported:
         objections += _check_locked_in_energy(
@@ -203,11 +191,7 @@ def compare_runs(
         )
         if mean_reference > round_off(reference):
             objections += _check_mean_energy(mean / mean_reference, min_mean)
-    if error is not None and error > MOST_MOMENTUM_ERROR:
-        moved = f"the momentum of the switched run after td differs by {error:.1%}"
-        objections.append(
-            f"{moved} from that of the reference run, so it moves differently"
-        )
+    objections += _check_momentum(error)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -226,6 +210,29 @@ def compare_runs(
         notes=tuple(notes),
         min_mean=min_mean,
     )
+
+
+def _select_energies_after(
+    switched: History, td: float, end: float
+) -> tuple[Samples, float | None]:
+    """Return the energies of the switched run from td to ``end``, and a wrong one of the rigid parts before them.
+
+    The second value is the energy that the solver reports while the parts are rigid, None if it is right.
+    """
+    energies_after = switched.between(td, end)[1]
+    energies_before = switched.energy[switched.time < td]
+    if not energies_before.size:
+        return energies_after, None
+    energy_rigid = float(energies_before[-1])
+    energies_to_end = switched.between(td, np.inf)[1]
+    if energies_after[0] == energy_rigid and _is_reported_wrong(
+        energy_rigid, energies_to_end[1:]
+    ):
+        # The solver switches at the first step from td on, so the parts were still rigid in this state.
+        energies_after = energies_after[1:]
+        energies_to_end = energies_to_end[1:]
+    is_wrong = _is_reported_wrong(energy_rigid, energies_to_end)
+    return energies_after, energy_rigid if is_wrong else None
 
 
 def _check_number_of_states(
@@ -340,6 +347,13 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
             f"the mean energy after td is {share:.2g} times that of the reference run"
         )
         yield f"{mean_text}, {min_mean:g} to {2 - min_mean:g} were expected (`min_mean_energy`)"
+
+
+def _check_momentum(error: float | None) -> Iterator[str]:
+    """Yield an objection if the momentum after td differs by the share ``error`` from that of the reference run."""
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        moved = f"the momentum of the switched run after td differs by {error:.1%}"
+        yield f"{moved} from that of the reference run, so it moves differently"
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:

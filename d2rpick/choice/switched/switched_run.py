@@ -171,14 +171,16 @@ def prepare_switched_history(
 def select_model_momenta(history: History) -> History:
     """Return a history without part momenta, as rigid bodies have replaced parts.
 
-    Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies.
+    Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies.  What is
+    written of the parts is kept for flights in which they are deformable.
     """
     whole = tuple(
         replace(momenta, flying=momenta.chosen)
         for momenta in history.momenta
         if momenta.parts is None
     )
-    return replace(history, evidence=Given(whole, history.balance))
+    evidence = Given(whole, history.balance, written=history.evidence)
+    return replace(history, evidence=evidence)
 
 
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:

@@ -185,11 +185,33 @@ class TradeOff:
     start: Offer | None = None
     step: Offer | None = None
 
+    @property
+    def more_accurate(self) -> Offer | None:
+        """The offer with the smallest error; None if the recommended one has it, or if its error is of another kind."""
+        recommended = self.recommended
+        if recommended is None:
+            return None
+        by_energy = recommended.basis == "energy"
+        smaller = (
+            offer
+            for offer in self.offers
+            if _is_comparable(offer)
+            and (offer.basis == "energy") == by_energy
+            and round_error(offer.error) < round_error(recommended.error)
+        )
+        return min(smaller, key=lambda offer: round_error(offer.error), default=None)
+
     def decide_on(self, offer: Offer) -> Decision | None:
-        """Return the verdict on the pair of an offer as ``suggest`` gives it, with a better pair if there is one."""
+        """Return the verdict on the pair of an offer as ``suggest`` gives it, with a better pair if there is one.
+
+        If no other td is clearly better than the requested one, its cure says so.
+        """
         if offer.recommended:
             return self.suggestion.decision
-        return offer.decision_with_cure
+        decision = offer.decision_with_cure
+        if decision and offer is self.requested and self.step is None:
+            return decision._replace(best_of=self.td_window)
+        return decision
 
 
 def explore_run(

@@ -92,6 +92,27 @@ class _Form(NamedTuple):
     fixed: int
 
 
+class _Directory(NamedTuple):
+    """A directory while its records are read: they start at the byte ``start``.
+
+    ``number`` is that of the state, -1 if the directory is no state.
+    """
+
+    path: tuple[str, ...]
+    number: int
+    start: int
+
+    @property
+    def is_state(self) -> bool:
+        """True if the directory holds the values of a state."""
+        return self.number >= 0
+
+    @property
+    def branch(self) -> str:
+        """Path of the directory above."""
+        return "/".join(self.path[:-1])
+
+
 class Lsda:
     """The directories of one file, found by reading its records.
 
@@ -201,9 +222,7 @@ class Lsda:
         head = self._head.size
         size, name_length = len(data), head + self._type.size
         near, base = b"", 0  # the bytes around the current position
-        path: tuple[str, ...] = ()
-        number = -1
-        start = position
+        directory = _Directory((), -1, position)
         records = list[bytes]()
         command = 0
         # start of the last state of each branch
@@ -221,30 +240,26 @@ class Lsda:
                 break
             heads.add(near[at : at + head])
             if command == DIRECTORY:
-                self._leave(path, number, start, records)
+                self._leave(directory, records)
                 records = []
-                text = data[position + head : end]
-                if not text.isascii() or not text.decode().isprintable():
+                entered = self._enter(directory.path, position + head, end)
+                if entered is None:
                     break
-                entered = _resolve_path(path, text.decode())
-                state = _STATE.search(text)
-                if state:
-                    branch = entered[:-1]
+                if entered.is_state:
+                    branch = entered.path[:-1]
                     ahead = self._skip(anchors.get(branch), position)
                     if ahead:
                         anchors.clear()
                         position += ahead
                         continue
                     anchors[branch] = position
-                path = entered
-                number = int(state[1]) if state else -1
-                start = end
-                self.names.update(path[:1])
-                form = self._same_again(path, start) if state else None
+                directory = entered
+                self.names.update(directory.path[:1])
+                form = self._same_again(directory)
                 if form:
                     records = list(form.heads)
                     command = VARIABLE
-                    end = start + form.length
+                    end = directory.start + form.length
             elif command == VARIABLE and length > name_length:
                 name_end = at + name_length + 1 + near[at + name_length]
                 records.append(near[at : min(at + length, name_end)])
@@ -255,11 +270,20 @@ class Lsda:
             data[position : position + head], heads
         ):
             records = records[:-1]
-        self._leave(path, number, start, records)
+        self._leave(directory, records)
         if position < size:
             self.stop = f"no complete record at byte {position} of {size}"
-        if number >= 0 and (self.stop or command == VARIABLE):
-            self.unfinished = "/".join(path[:-1])
+        if directory.is_state and (self.stop or command == VARIABLE):
+            self.unfinished = directory.branch
+
+    def _enter(self, path: tuple[str, ...], begin: int, end: int) -> _Directory | None:
+        """Return the directory that a record enters from ``path``; None if the bytes of the record are no name."""
+        text = self.data[begin:end]
+        if not text.isascii() or not text.decode().isprintable():
+            return None
+        state = _STATE.search(text)
+        number = int(state[1]) if state else -1
+        return _Directory(_resolve_path(path, text.decode()), number, end)
 
     def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
         """Return True if the file was truncated in the record ``last_bytes``; otherwise that record is damaged.
@@ -271,13 +295,11 @@ class Lsda:
         length, command = self._head.unpack(last_bytes.ljust(self._head.size, b"\0"))
         return command in _TABLES and length < _LONGEST
 
-    def _leave(
-        self, path: tuple[str, ...], number: int, start: int, records: list[bytes]
-    ) -> None:
+    def _leave(self, directory: _Directory, records: list[bytes]) -> None:
         """Store the variables of the directory that ends here, if they are wanted."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
             records.pop()  # a symbol table after the variables is not part of the layout
-        branch = "/".join(path[:-1])
+        branch = directory.branch
         if not records or branch not in self.visits:
             return
         key = tuple(records)
@@ -285,14 +307,14 @@ class Lsda:
         if layout is None:
             layout = self._known[key] = len(self.layouts)
             self.layouts.append(self._layout(records))
-        if number >= 0:
-            self.visits[branch].extend((number, start, layout))
+        if directory.is_state:
+            self.visits[branch].extend((directory.number, directory.start, layout))
             if self._forms.get(branch, (-1,))[0] != layout:
                 self._forms[branch] = layout, self._form(key)
-        elif path[-1] == "metadata":
-            self.metadata[branch].append((start, layout))
+        elif directory.path[-1] == "metadata":
+            self.metadata[branch].append((directory.start, layout))
         else:
-            self.odd[branch].append(path[-1])
+            self.odd[branch].append(directory.path[-1])
 
     def _layout(self, records: list[bytes]) -> DirectoryLayout:
         """Return the variables defined by the record headers of a directory; an invalid header defines none."""
@@ -325,14 +347,13 @@ class Lsda:
             fixed += head + values
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
-    def _same_again(self, path: tuple[str, ...], start: int) -> _Form | None:
+    def _same_again(self, directory: _Directory) -> _Form | None:
         """Return the form of the last state of the branch if this state has the same records, else None."""
-        branch = "/".join(path[:-1])
-        if branch not in self._forms:
+        if not directory.is_state or directory.branch not in self._forms:
             return None
-        form = self._forms[branch][1]
-        end = start + form.length
-        block = int.from_bytes(self.data[start:end])
+        form = self._forms[directory.branch][1]
+        end = directory.start + form.length
+        block = int.from_bytes(self.data[directory.start : end])
         if end <= len(self.data) and block & form.mask == form.fixed:
             return form
         return None

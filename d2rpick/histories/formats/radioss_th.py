@@ -33,7 +33,7 @@ from d2rpick.histories.names import Part, Selection, clean_text
 from d2rpick.histories.resuming import ResumePoint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.content import Addresses
     from d2rpick.histories.history import Samples
@@ -62,6 +62,9 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
+# The kind of a group of nodes, and the variable codes of the displacements.
+_NODES: Final = 0
+_DISPLACEMENTS: Final = (1, 2, 3)
 # Kinds of groups that have forces, and the variable codes of the normal and tangential impulses.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
@@ -70,7 +73,7 @@ _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 class _Group(NamedTuple):
     """A group with a history: its kind, the number of its members, and the codes of its variables.
 
-    ``named`` are number and title of each member; empty for a group without forces.
+    ``named`` are number and title of each member; empty for a group of neither nodes, interfaces nor rigid walls.
     """
 
     kind: int
@@ -182,14 +185,40 @@ class TimeHistory(Database):
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the interfaces and rigid walls that have a history (cards /TH/INTER and /TH/RWALL)."""
-        groups = [group for group in self._head.groups if group.values]
-        first = len(self._begins) - len(groups)
         return tuple(
             self._force_of(record, group, member)
-            for record, group in enumerate(groups, start=first)
+            for record, group in self._list_groups()
             if group.kind in _TOUCHING and {*_IMPULSES[0]} <= {*group.variables}
             for member in range(group.members)
         )
+
+    @cached_property
+    def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Numbers of the nodes with written displacements (card /TH/NODE)."""
+        return tuple(self._displacement_columns)
+
+    def node_displacements(self, ids: Sequence[int]) -> Samples:
+        """Return the displacements of some nodes since the start of the run, shape (n, len(ids), 3)."""
+        places = [self._displacement_columns[id_] for id_ in ids]
+        moved = [self._columns(record, columns) for record, columns in places]
+        return np.stack(moved, axis=1)
+
+    @cached_property
+    def _displacement_columns(self) -> dict[int, tuple[int, list[int]]]:
+        """The record with the displacements of each node, and their three columns in it."""
+        places: dict[int, tuple[int, list[int]]] = {}
+        for record, group in self._list_groups():
+            if group.kind == _NODES and {*_DISPLACEMENTS} <= {*group.variables}:
+                first = [group.variables.index(code) for code in _DISPLACEMENTS]
+                for member, (number, _) in enumerate(group.named):
+                    before = member * len(group.variables)
+                    places[number] = record, [before + column for column in first]
+        return places
+
+    def _list_groups(self) -> Iterator[tuple[int, _Group]]:
+        """Yield the groups with values, each with the index of its record."""
+        groups = [group for group in self._head.groups if group.values]
+        return enumerate(groups, start=len(self._begins) - len(groups))
 
     def _force_of(self, record: int, group: _Group, member: int) -> ContactForce:
         """Return the force of one interface or rigid wall of a group, from its normal and tangential impulses."""
@@ -209,12 +238,6 @@ class TimeHistory(Database):
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
-
-    def size_until(self, time: float) -> int:
-        """Return the bytes of the header and of the states up to a time [time]."""
-        return self._records.at + self._stride * int(
-            np.searchsorted(self.time, time, side="right")
-        )
 
     @cached_property
     def part_time(self) -> Samples:
@@ -398,10 +421,10 @@ class _HeadRecords:
         for number in (elements, variables):
             self._count(number)
         members = [self._titled(1) for _ in range(elements)]
-        forces = members if kind in _TOUCHING else []
+        named_members = members if kind == _NODES or kind in _TOUCHING else []
         names = tuple(
             (INT.unpack_from(member)[0], clean_text(member[WIDTH:]))
-            for member in forces
+            for member in named_members
         )
         return _Group(kind, elements, names, self._integers(variables))
 

@@ -13,7 +13,16 @@ from d2rpick.histories.source import Source
 from tests.command import BOX, ROLLOVER
 from tests.computed import locate_stored, read_unpacked
 from tests.damaged_files import FILES, printed
-from tests.made_t01 import MadePart, T01TextWriter, T01Writer, make_t01, make_value
+from tests.energies import require
+from tests.made_t01 import (
+    MadePart,
+    T01TextWriter,
+    T01Writer,
+    make_t01,
+    make_value,
+    pack_numbers,
+    write_head,
+)
 from tests.reading import open_contents
 
 SMALL = FILES["T01 as text"]
@@ -120,6 +129,42 @@ def test_legs_follow_one_another() -> None:
     ]
     assert [leg.time.size for leg in legs] == [201, 541, 161]
     assert (np.diff(np.concatenate([leg.time for leg in legs])) > 0).all()
+
+
+def write_moving_nodes(first: int, states: int, writer: T01Writer) -> bytes:
+    """Return a history of nodes 5 to 7: six values each, three of them displacements."""
+    write_head([MadePart(3, "box")], globals_=22, writer=writer)
+    for state in range(first, first + states):
+        moved = [state + value / 32 for value in range(18)]
+        writer.state(state / 8, [0.0] * 22, [0.0] * 8, nodes=moved)
+    return bytes(writer.data)
+
+
+@pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
+def test_displacements_of_nodes_are_read_by_their_numbers_in_all_legs(
+    into: Callable[[], T01Writer],
+) -> None:
+    legs = [write_moving_nodes(first, 3, into()) for first in (0, 3)]
+    run = open_contents(radioss_th, *legs)
+    motion = require(run.displacements((7, 9, 5)))
+    assert motion.time.tolist() == [state / 8 for state in range(6)]
+    assert motion.ids == (5, 7)
+    for state in range(6):
+        expected = [
+            [state + value / 32 for value in at] for at in ((0, 1, 2), (12, 13, 14))
+        ]
+        assert motion.displacements[state].tolist() == expected
+    assert run.displacements((9,)) is None
+
+
+def test_nodes_that_a_leg_lacks_are_not_read() -> None:
+    with_nodes = write_moving_nodes(0, 3, T01Writer())
+    without = with_nodes.replace(
+        pack_numbers("i", [5]) + b"corner", pack_numbers("i", [4]) + b"corner"
+    )
+    later = write_moving_nodes(3, 3, T01Writer())
+    run = open_contents(radioss_th, without, later)
+    assert require(run.displacements((4, 5, 6))).ids == (6,)
 
 
 def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> None:

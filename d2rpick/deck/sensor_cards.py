@@ -1,0 +1,46 @@
+"""Write Radioss sensors: of a time, of a contact force, and of other sensors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.deck.printed_card import write_number
+from d2rpick.deck.radioss_columns import DELAY, FORCE_SENSOR, SENSOR_INPUTS, STOP
+from d2rpick.deck.radioss_sensors import NEVER
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def write_time_sensor(
+    number: int, title: str, start: float, stop: float | None = None
+) -> str:
+    """Return a sensor that is active from ``start`` on, or up to ``stop`` if the file knows an end [time]."""
+    text = f"/SENSOR/TIME/{number}\n{title}\n{DELAY.write(Tdelay=write_number(start, 20))}\n"
+    if stop is None:
+        return text
+    return f"{text}{STOP.write(Tstop=write_number(min(stop, NEVER), 20))}\n"
+
+
+def write_force_sensor(number: int, kind: str, entity: int, wait: float) -> str:
+    """Return a sensor that is active while a contact or rigid wall has a force, and for ``wait`` after it [time]."""
+    delay = DELAY.write(Tdelay=write_number(wait, 20))
+    force = FORCE_SENSOR.write(ID=entity, Dir="NF", Fmin=-1.0)
+    return f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{delay}\n{force}\n"
+
+
+def write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) -> str:
+    """Return a sensor of kind OR, AND or NOT with one or two other sensors as inputs."""
+    names = ("sens_ID1", "sens_ID2")[: len(inputs)]
+    row = SENSOR_INPUTS.write(**dict(zip(names, inputs, strict=True)))
+    return f"/SENSOR/{kind}/{number}\n{title}\n{DELAY.write(Tdelay=0)}\n{row}\n"
+
+
+def write_any_of(numbers: Sequence[int], title: str) -> tuple[str, int]:
+    """Return sensors that are active while any of given ones is, numbered after these, and the id of the last one."""
+    texts: list[str] = []
+    last, *others = numbers
+    for number, other in enumerate(others, start=numbers[-1] + 1):
+        texts.append(write_sensor_of_sensors("OR", number, title, last, other))
+        last = number
+    return "".join(texts), last

@@ -1,0 +1,158 @@
+"""Find the frame of a body in flight: how its parts, or nodes whose motion is written, are rotated against the deck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+
+if TYPE_CHECKING:
+    from d2rpick.deck.geometry import Placement
+    from d2rpick.histories.history import NodeMotion, Samples
+    from d2rpick.histories.names import Part
+
+# Reads the displacements of those of some nodes that are written; None without any.
+Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
+
+# Largest deviation of points from their positions in the rotated deck, relative to the size of the body.
+# A body that is bent more, or placed elsewhere, has no orientation to 0.1 degrees.
+_MOST_BENT: Final = 0.05
+# Connected parts define the body frame if they have this share of its mass, else all parts that do not move.
+_MOST: Final = 0.5
+# Points are treated as lying on a line if one moment of inertia is below this share of the others.
+_ALONG_LINE: Final = 1e-9
+# So many nodes, spread over the body, define its frame; more of them would be read for little.
+_MOST_NODES: Final = 50
+
+
+class Frame(NamedTuple):
+    """Orientation of a body: ``axes`` (n, 3, 3) rotate directions of the deck to those at each time.
+
+    ``doubt`` is the angle by which bending of the body turns its frame from one time to another [rad].
+    """
+
+    axes: Samples
+    doubt: float
+
+
+def fit_frame(deck: Samples, where: Samples, mass: Samples) -> Frame | None:
+    """Fit the orientation of points of a body to their places.
+
+    Parameters
+    ----------
+    deck : array of shape (points, 3)
+        Places in the deck [length].
+    where : array of shape (n, points, 3)
+        Places over time [length].
+    mass : array of shape (points,)
+        Weights of the points.
+
+    Returns
+    -------
+    Frame or None
+        None if the points lie on a line, or deviate from a rotated deck by more than 5 % of their extent across it.
+    """
+    shape = deck - np.average(deck, axis=0, weights=mass)
+    arms = where - np.average(where, axis=1, weights=mass)[:, np.newaxis]
+    axes = _fit_orientations(shape, arms, mass)
+    places = arms @ axes
+    if _measure_bending(shape, places, mass) > _MOST_BENT:
+        return None
+    return Frame(axes, _estimate_doubt(shape, places - shape, mass))
+
+
+def find_frame_of_nodes(
+    parts: Sequence[int],
+    placement: Placement,
+    displacements: Displacements,
+    time: Samples,
+) -> Frame | None:
+    """Find the orientation of parts (ids) at times (n,) from the written motion of their nodes; None if unknown."""
+    coordinates = placement.find_watched_nodes(parts)
+    spread_ids = list(coordinates)[:: -(-len(coordinates) // _MOST_NODES) or 1]
+    motion = displacements(spread_ids)
+    if motion is None:
+        return None
+    deck = np.stack([coordinates[id_] for id_ in motion.ids])
+    moved = motion.displacements.reshape(motion.time.size, -1)
+    at_times = [np.interp(time, motion.time, column) for column in moved.T]
+    where = deck + np.stack(at_times, axis=1).reshape(time.size, -1, 3)
+    return fit_frame(deck, where, np.ones(len(deck)))
+
+
+def choose_frame_parts(
+    members: Sequence[int],
+    moving: Sequence[int],
+    parts: Sequence[Part],
+    masses: Samples,
+    placement: Placement,
+) -> Sequence[int]:
+    """Return the parts that define the body frame: connected parts that do not move relative to each other.
+
+    ``members`` and ``moving`` are columns of the ``parts``, which have these ``masses`` (parts,).
+    """
+    still = [i for i in members if i not in moving]
+    together = placement.hanging_together([parts[i].id for i in still])
+    main = [i for i in still if parts[i].id in together]
+    if masses[main].sum() >= _MOST * masses[list(members)].sum():
+        return main
+    return still
+
+
+def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
+    """Return how much the rotation between two times changes if each frame part is left out in turn.
+
+    Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
+    line determine no angle and give 0.
+    """
+    count = mass.size
+    alone = mass * mass.sum() / (mass.sum() - mass)
+    other_inertia = compute_second_moments(shape[np.newaxis], mass) - np.einsum(
+        "p,pi,pj->pij", alone, shape, shape
+    )
+    light = np.linalg.pinv(
+        compute_inertia(other_inertia), rcond=_ALONG_LINE, hermitian=True
+    )
+    turned = np.einsum(
+        "pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent)
+    )
+    return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
+
+
+def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
+    """Return the rotations (n, 3, 3) that best map a shape (parts, 3) to the positions ``where`` (n, parts, 3)."""
+    left_vectors, _, right_vectors = np.linalg.svd(
+        np.einsum("p,npi,pj->nij", mass, where, shape)
+    )
+    mirrored = np.linalg.det(left_vectors @ right_vectors) < 0
+    left_vectors[mirrored, :, 2] *= -1
+    return np.asarray(left_vectors @ right_vectors)
+
+
+def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
+    """Return the deviation of points from their shape, relative to its size across its longest axis.
+
+    Infinite if the points lie on a line.
+    """
+    moments = compute_second_moments(shape[np.newaxis], mass)[0] / mass.sum()
+    *across, along = np.linalg.eigvalsh(moments).tolist()
+    if sum(across) <= _ALONG_LINE * along:
+        return np.inf
+    deviation = np.einsum("p,npi->", mass, (places - shape) ** 2)
+    return float(np.sqrt(deviation / (len(places) * mass.sum() * sum(across))))
+
+
+def compute_second_moments(places: Samples, mass: Samples) -> Samples:
+    """Return the second mass moments of positions."""
+    return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
+
+
+def compute_inertia(second: Samples) -> Samples:
+    """Return the inertia tensor from the second moments (..., 3, 3)."""
+    return np.asarray(
+        np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
+        - second
+    )

@@ -1,0 +1,98 @@
+"""Bound the speed that rotation may add where a body touches, if no file shows how the body turns.
+
+The kinetic energy of a body less that of its centre of mass is the energy of its vibration and of its rotation, and
+the latter is the same in all states of a flight.  Its least value therefore bounds the rotation.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.flight.body_frame import compute_inertia, compute_second_moments
+from d2rpick.flight.margin import compute_closing_speed, select_momenta_of_flight
+from d2rpick.histories.samples import find_window
+
+if TYPE_CHECKING:
+    from d2rpick.deck.geometry import Placement
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Samples
+
+
+def bound_turning_speed(
+    history: History, flight: Flight, placement: Placement
+) -> float | None:
+    r"""Return the largest speed that rotation can give to any node of the flying parts [length/time].
+
+    With the energy E of the rotation, the inertia I and the place r of a node about the centre of mass, the speed of
+    the node along a unit vector n is (r x n) w, so that
+
+    .. math:: v \le \sqrt{2 E\, (r \times n)^T I^{-1} (r \times n)}
+
+    whatever w is.  The largest value over all nodes and directions counts.  None if the momenta of parts, their places
+    in the deck or the kinetic energy are unknown.
+    """
+    evidence = select_momenta_of_flight(history, flight)
+    if evidence is None or evidence[0].parts is None or flight.parts is None:
+        return None
+    momenta, members = evidence
+    energy = _bound_energy_of_rotation(history, flight)
+    mass = momenta.masses
+    parts = [part.id for part in flight.parts]
+    if mass is None or energy is None or not placement.parts.keys() >= set(parts):
+        return None
+    factor = _compute_largest_factor(placement, parts, mass[list(members)])
+    return float(np.sqrt(2 * energy * factor))
+
+
+def may_turn_back(history: History, flight: Flight) -> bool:
+    """Return True if the energy of the rotation may move parts away from the ground as fast as the body approaches it.
+
+    Parts at the radius of gyration then have the speed of the centre of mass; those outside are faster.  False if the
+    files do not show it.
+    """
+    evidence = select_momenta_of_flight(history, flight)
+    energy = _bound_energy_of_rotation(history, flight)
+    closing = compute_closing_speed(history, flight)
+    if evidence is None or energy is None or closing is None:
+        return False
+    momenta, members = evidence
+    return bool(2 * energy >= momenta.mass(members) * closing**2)
+
+
+def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:
+    """Return an upper bound of the energy of the rotation in a flight [energy]; None if masses or energies are unknown.
+
+    If only the kinetic energy of the model is written it serves, since that of the flying parts is not larger.
+    """
+    evidence = select_momenta_of_flight(history, flight)
+    kinetic = history.evidence.kinetic_energy(flight.parts)
+    kinetic = kinetic or history.evidence.kinetic_energy(None)
+    if evidence is None or kinetic is None:
+        return None
+    momenta, members = evidence
+    mass = momenta.mass(members)
+    inside = find_window(momenta.time, *flight.within(momenta.time))
+    if not mass > 0 or momenta.time[inside].size == 0:
+        return None
+    momentum = momenta.of(members)[inside]
+    of_centre = np.square(momentum).sum(axis=1) / (2 * mass)
+    whole = np.interp(momenta.time[inside], kinetic.time, kinetic.values)
+    return max(0.0, float((whole - of_centre).min()))
+
+
+def _compute_largest_factor(
+    placement: Placement, parts: list[int], mass: Samples
+) -> float:
+    """Return the largest (r x n) I^-1 (r x n) over all nodes r of some parts and all unit vectors n [1/mass]."""
+    centres = np.stack([placement.parts[part].centre for part in parts])
+    spreads = np.stack([placement.parts[part].spread for part in parts])
+    home = np.average(centres, axis=0, weights=mass)
+    second = compute_second_moments((centres - home)[np.newaxis], mass)[0]
+    inertia = compute_inertia(second + np.einsum("p,pij->ij", mass, spreads))
+    light = np.linalg.pinv(inertia, hermitian=True)
+    arms = placement.find_nodes(parts) - home
+    crossed = np.cross(arms[:, np.newaxis], np.eye(3))
+    factors = np.linalg.eigvalsh(np.einsum("nai,ij,nbj->nab", crossed, light, crossed))
+    return float(factors[:, -1].max())
