@@ -192,7 +192,7 @@ def find_drift(
     mass = masses[members]
     if not has_clear_rotation(mass):
         return None
-    ways, path = _integrate_displacements(
+    ways, path = integrate_displacements(
         time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
     )
     stride = -(-time.size // _STATES)
@@ -225,7 +225,7 @@ def find_drift(
     return drift if turning or doubt <= drift.limit else None
 
 
-def _integrate_displacements(
+def integrate_displacements(
     time: Samples, velocity: Samples, mass: Samples
 ) -> tuple[Samples, Samples]:
     """Return the displacements of parts (n, parts, 3) from their centre of mass, and its path (n,) [length]."""

@@ -48,7 +48,7 @@ _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
 _EARLY: Final = 0.25
 # _LEAST_TURNS: fewest cycles of a line in the record. _MOST_DAMPED: largest damping of a line, as a share of its rate.
 # _MOST_DECAY: largest exponent by which a line decays within the record.
-_LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
+_LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 40.0
 # A free vibration does not grow, but noise may make it seem to grow by up to this exponent over the record.
 _MOST_GROWTH: Final = 0.2
 # The mean is a constant plus at most _MOST_DECAYS decays.

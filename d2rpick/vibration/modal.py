@@ -254,10 +254,20 @@ class ModalVibration:
     @property
     def convinces(self) -> bool:
         """Return True if the modes predict the record so well that no load can act in it."""
+        return self._predicts_within(1.0)
+
+    @property
+    def is_exact(self) -> bool:
+        """Return True if the modes predict the record even ten times better than they have to."""
+        return self._predicts_within(0.1)
+
+    def _predicts_within(self, share: float) -> bool:
+        """Return True if the modes miss no more of the record than a share of what they may, apart from white noise."""
         white = 1 - self.systematic
         structure = self.doubts.misfit * np.sqrt(self.systematic)
         missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
-        return self.signed and structure < _LITTLE_LEFT and missed < _LITTLE_MISSED**2
+        most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
+        return self.signed and structure < most_left and missed < most_missed**2
 
     @property
     def told(self) -> str:
@@ -345,7 +355,17 @@ class ModalVibration:
         )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the half-width of the band of R^2 for pairs of times [-]."""
+        """Return half of the width of the band of R^2 for pairs of times [-]."""
+        off, below, above = self._compute_errors(tr, td)
+        return np.asarray(off + (below + above) / 2)
+
+    def _compute_errors(
+        self, tr: Samples | float, td: Samples | float
+    ) -> tuple[Samples, Samples, Samples]:
+        """Return the error of R^2 for pairs of times, and how far alternatives are below and above it, beyond that [-].
+
+        Alternatives are other readings of the lines, and what the kinetic energy says: each is on one side.
+        """
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
         lines = (
@@ -356,12 +376,7 @@ class ModalVibration:
         # Both show how accurate the lines are: the scatter of the fit, and the fit to the first part of the record.
         of_lines = np.maximum(deviation, lines)
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
-        width_of_neglected = np.zeros_like(squared)
-        if self.second is not None:
-            second = self.second.reading.residual_squared(tr, td)
-            room = self.second.half_width(tr, td)
-            width_of_neglected = np.maximum(np.abs(second - squared) - room, 0.0)
-        return np.asarray(
+        off = np.asarray(
             _LEAST_HALF
             + _compute_effect_of_deformation(_NOT_LINEAR, squared)
             + min(self._wrong, 1.0) * (1 + np.abs(squared - 1))
@@ -372,8 +387,16 @@ class ModalVibration:
                 np.sqrt(_SWINGING_COUNTS * self.swinging / level), squared
             )
             + self.bent * (_BENT_ALIKE + _BENT_ACROSS * _compute_sine(squared))
-            + width_of_neglected
-            + self._of_other_readings(tr, td, squared)
+        )
+        below, above = self._compute_shift_of_readings(tr, td, squared)
+        if self.second is None:
+            return off, below, above
+        shift = self.second.reading.residual_squared(tr, td) - squared
+        room = self.second.half_width(tr, td)
+        return (
+            off,
+            below + np.maximum(-shift - room, 0.0),
+            above + np.maximum(shift - room, 0.0),
         )
 
     @property
@@ -398,7 +421,8 @@ class ModalVibration:
 
         Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.
         """
-        return measures.band_about(np.square(stated), self.half_width(tr, td), 0.0, 0.0)
+        off, below, above = self._compute_errors(tr, td)
+        return measures.band_about(np.square(stated), off, above, below)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the share of the vibration energy at td that a hidden mode needs to explain the band, for each tr [-].
@@ -429,25 +453,25 @@ class ModalVibration:
             + doubts.harmonic
         )
 
-    def _of_other_readings(
+    def _compute_shift_of_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
-    ) -> Samples:
-        """Return the error of R^2 that results if another interpretation of the lines is correct [-]."""
-        apart = [
-            np.abs(reading.residual_squared(tr, td) - squared)
-            for reading in self.others
-        ]
-        if self.reading.no_static or self.is_ambiguous:
-            if apart:
-                return np.asarray(np.max(apart, axis=0))
-            return np.zeros(squared.shape)
-        # Upper limit of the energy of lines hidden in the misfit, in addition to the identified lines.
-        hidden = (
-            _find_most_hidden(self.reading.spectrum.rest)
-            / self.reading.level(td)
-            * np.abs(1.5 - squared)
+    ) -> tuple[Samples, Samples]:
+        """Return how far R^2 is lower, and how far it is higher, if another interpretation of the lines is correct [-].
+
+        In the best interpretation with a static energy, some of that may be lines hidden in the misfit: no more of it
+        than these can hold, and no more than all.
+        """
+        none = np.zeros(squared.shape)
+        shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
+        if not (self.reading.no_static or self.is_ambiguous):
+            hidden = _find_most_hidden(self.reading.spectrum.rest)
+            shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
+            nearest = np.argmin(np.abs(shifts), axis=0)
+            shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        return (
+            np.max([none, *np.negative(shifts)], axis=0),
+            np.max([none, *shifts], axis=0),
         )
-        return np.asarray(np.min([*apart, hidden], axis=0))
 
     @property
     def is_ambiguous(self) -> bool:

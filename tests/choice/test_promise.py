@@ -8,7 +8,13 @@ import pytest
 
 import d2rpick
 from d2rpick.choice.question import Settings
-from tests.benchmarks.promise import BAD, CLASSES, KEEPS_NOTHING, ask_for_pair
+from tests.benchmarks.promise import (
+    BAD,
+    CLASSES,
+    DESERVES_GOOD,
+    KEEPS_NOTHING,
+    ask_for_pair,
+)
 from tests.benchmarks.promise_parts import (
     CLASSES as CLASSES_OF_PARTS,
     Motion,
@@ -41,6 +47,48 @@ def test_what_was_upside_down_has_the_sign_of_td(
     )
     assert pair.kept or pair.true < require(pair.residual)
     assert pair.true < BAD
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "number"),
+    [
+        # An oscillator describes only a short part of these, for the mean energy drifts.
+        ("drift and heating", 5, 2),
+        pytest.param("drift and heating", 6, 1, marks=pytest.mark.slow),
+        # An oscillator seems to describe the end of the load before this flight.
+        ("harmonic", 7, 0),
+        # Damping takes one mode away in the first fifth of the flight.
+        pytest.param("stiffness damping", 7, 1, marks=pytest.mark.slow),
+        # The band is one-sided: other readings of the lines say less.
+        ("exchange, 1 % noise", 6, 2),
+        pytest.param("10 modes, 1 % noise", 5, 0, marks=pytest.mark.slow),
+        # A hardly longer pair beyond the limit of a good one.
+        pytest.param("irregular", 6, 0, marks=pytest.mark.slow),
+        pytest.param("3 to 5 modes, noise", 6, 3, marks=pytest.mark.slow),
+    ],
+)
+def test_a_good_pair_that_exists_is_found_and_called_good(
+    name: str, seed: int, number: int, tmp_path: Path
+) -> None:
+    record = CLASSES[name](np.random.default_rng([seed, number]))
+    pair = require(ask_for_pair(record, tmp_path))
+    assert pair.grade == "good"
+    assert pair.true < DESERVES_GOOD
+    assert pair.kept
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "number"),
+    [("exchange, 1 % noise", 6, 3), ("friction", 7, 3)],
+)
+def test_a_long_pair_is_not_taken_because_others_are_short(
+    name: str, seed: int, number: int, tmp_path: Path
+) -> None:
+    """R of 0.75 and 0.82 were recommended where pairs as long have 0.25 to 0.43, whose bands are wide."""
+    record = CLASSES[name](np.random.default_rng([seed, number]))
+    pair = require(ask_for_pair(record, tmp_path))
+    assert pair.true < 0.5
+    assert pair.kept
 
 
 def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(

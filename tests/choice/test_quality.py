@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from d2rpick.choice.answers import suggest_in_history, verify_in_history
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
+    Errors,
     Grade,
     Quality,
     count_states_per_period,
@@ -36,6 +38,7 @@ rows = st.lists(
         st.one_of(st.floats(0, 0.1), st.floats(0, 2), st.just(np.inf)),
         st.sampled_from([0, 1, 2]),
         st.booleans(),
+        st.floats(0.5, 1),
     ),
     max_size=12,
 )
@@ -56,47 +59,115 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     assert "residual unknown" in " ".join(judged.reasons)
 
 
-@given(rows, st.sampled_from([0.0, 0.2]))
+class Ranked(NamedTuple):
+    """A candidate of `order_by_quality`."""
+
+    rigid: float
+    error: float
+    group: int
+    is_out_of_place: bool
+    expected: float
+    is_good: bool
+
+
+def find_limit_of_alike(ranked: list[Ranked]) -> float:
+    """Return the expected error that the band of the best candidate leaves open, within its grade."""
+    smallest = min(row.error for row in ranked)
+    expected = min(row.expected for row in ranked if row.error == smallest)
+    bounds = [bound for bound in (0.5, 1.0) if expected <= bound]
+    return min([max(smallest, expected), *bounds])
+
+
+@given(rows, st.booleans())
 def test_the_order_of_candidates(
-    candidate_rows: list[tuple[float, float, int, bool]], alike: float
+    drawn: list[tuple[float, float, int, bool, float]], has_good: bool
 ) -> None:
-    rigid, error = (
-        np.array([row[0] for row in candidate_rows]),
-        np.array([row[1] for row in candidate_rows]),
-    )
-    # differences in further decimals are rounding
     candidate_rows = [
-        (row[0], float(np.round(row[1], 4)), *row[2:]) for row in candidate_rows
+        Ranked(*row[:4], row[1] * row[4], has_good and row[1] <= 0.2 and row[4] > 0.8)
+        for row in drawn
     ]
-    group, is_out_of_place = (
-        np.array([row[2] for row in candidate_rows], dtype=np.int32),
-        np.array([row[3] for row in candidate_rows], dtype=bool),
+    rigid, error, group, is_out_of_place, expected, is_good = (
+        np.array([row[column] for row in candidate_rows], dtype)
+        for column, dtype in enumerate((float, float, np.int32, bool, float, bool))
     )
     order_found = order_by_quality(
         group,
-        error,
+        Errors(error, expected, is_good),
         rigid,
         is_out_of_place,
         np.full(3, EQUALLY_GOOD),
-        np.full(3, alike),
     ).tolist()
+    # differences in further decimals are rounding
+    candidate_rows = [
+        row._replace(
+            error=float(np.round(row.error, 4)),
+            expected=float(np.round(row.expected, 4)),
+        )
+        for row in candidate_rows
+    ]
     assert sorted(order_found) == list(range(len(candidate_rows)))
-    assert [candidate_rows[i][2] for i in order_found] == sorted(group.tolist())
+    assert [candidate_rows[i].group for i in order_found] == sorted(group.tolist())
     for number in set(group.tolist()):
         ranked = [
-            candidate_rows[i] for i in order_found if candidate_rows[i][2] == number
+            candidate_rows[i] for i in order_found if candidate_rows[i].group == number
         ]
-        near = max(min(row[1] for row in ranked) + EQUALLY_GOOD, alike)
-        good = [row for row in ranked if row[1] <= near]
-        longest = max(row[0] for row in good)
-        late = [row for row in good if row[0] < 0.9 * longest]
-        long = [row for row in good if row not in late]
-        best = min(row[1] for row in long) + EQUALLY_GOOD
-        early = sorted(long, key=lambda row: (row[3], row[1] > best, -row[0], row[1]))
-        rows_far_off = sorted(
-            (row for row in ranked if row[1] > near), key=lambda row: (row[1], -row[0])
+        near = min(row.error for row in ranked) + EQUALLY_GOOD
+        limit = find_limit_of_alike(ranked)
+        alike = [row for row in ranked if row.is_good] or [
+            row for row in ranked if row.error <= near or row.expected <= limit
+        ]
+        longest = max(row.rigid for row in alike)
+        late = [row for row in alike if row.rigid < 0.9 * longest]
+        long = [row for row in alike if row not in late]
+        best = min(row.error for row in long) + EQUALLY_GOOD
+        early = sorted(
+            long,
+            key=lambda row: (
+                row.is_out_of_place,
+                row.error > best,
+                -row.rigid,
+                row.error,
+            ),
         )
-        assert ranked == early + sorted(late, key=lambda row: -row[0]) + rows_far_off
+        others = [row for row in ranked if row not in alike]
+        rows_far_off = sorted(others, key=lambda row: (row.error, -row.rigid))
+        assert [row[:4] for row in ranked] == [
+            row[:4]
+            for row in early + sorted(late, key=lambda row: -row.rigid) + rows_far_off
+        ]
+
+
+def make_errors(*errors: tuple[float, float, bool]) -> Errors:
+    """Return the errors of candidates from each error, what of it is expected, and whether it is good."""
+    error, expected, is_good = zip(*errors, strict=True)
+    return Errors(np.array(error), np.array(expected), np.array(is_good, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("errors", "first"),
+    [
+        # The band of the shorter pair leaves open whether it is better.
+        ([(0.62, 0.57, False), (0.66, 0.6, False)], 1),
+        ([(0.58, 0.57, False), (0.66, 0.6, False)], 0),
+        # Not beyond the limit of a grade, nor beyond what a release without a vibration has.
+        ([(0.55, 0.45, False), (0.6, 0.52, False)], 0),
+        ([(1.1, 0.9, False), (1.2, 1.05, False)], 0),
+        # Good pairs are alike; one that is hardly worse than the best of them, but not good, is not.
+        ([(0.1, 0.05, True), (0.2, 0.19, True)], 1),
+        ([(0.199, 0.199, True), (0.21, 0.21, False)], 0),
+    ],
+)
+def test_a_longer_pair_is_preferred_if_the_bands_do_not_tell_it_from_the_best(
+    errors: list[tuple[float, float, bool]], first: int
+) -> None:
+    order = order_by_quality(
+        np.zeros(2, np.int32),
+        make_errors(*errors),
+        np.array([0.4, 0.8]),
+        np.zeros(2, np.bool_),
+        np.full(1, EQUALLY_GOOD),
+    )
+    assert order[0] == first
 
 
 @pytest.mark.slow
@@ -411,11 +482,10 @@ def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> N
         noise = rounding * rng.standard_normal(count)
         order = order_by_quality(
             group,
-            error + noise,
+            Errors(error + noise, error + noise, out_of_place),
             rigid,
             out_of_place,
             np.full(1, EQUALLY_GOOD),
-            np.zeros(1),
         )
         return [*map(int, order)]
 

@@ -93,7 +93,8 @@ class Candidate(Measured, Record):
 class Pair(NamedTuple):
     """A recommended (tr, td) [time].
 
-    Pairs at different td are compared by ``error``, which is the ``residual`` if that is known.
+    Pairs at different td are compared by ``error``, which is the ``residual`` if that is known; ``residual_high`` is
+    its upper bound.
     """
 
     tr: float
@@ -101,6 +102,7 @@ class Pair(NamedTuple):
     residual: float | None
     error: float
     same_swing: bool
+    residual_high: float | None = None
 
     @property
     def rigid_time(self) -> float:
@@ -298,7 +300,7 @@ class Candidates(Sequence[Candidate]):
         i = self.order[self.recommended]
         values = {
             name: self.judged.columns[name][i].item()
-            for name in ("residual", "level_error", "same_swing")
+            for name in ("residual", "level_error", "same_swing", "residual_high")
         }
         residual = _replace_nan(values["residual"])
         error = values["level_error"] if residual is None else residual
@@ -308,6 +310,7 @@ class Candidates(Sequence[Candidate]):
             residual,
             error,
             values["same_swing"],
+            _replace_nan(values["residual_high"]),
         )
 
     @property
@@ -354,7 +357,7 @@ class Candidates(Sequence[Candidate]):
         td = situation.td
         if values["position_error"] is not None and situation.bodies:
             values |= _describe_position(situation.bodies.worst(tr, td))
-        rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
+        rigid_fraction = (td - tr) / history.duration
         parts = situation.vibration.part_matches(tr) if is_compared else ()
         notes = list[str]()
         for objection in judged.objections:
@@ -438,7 +441,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
-    first = max(start, float(situation.history.time[0]))
+    first = max(start, situation.history.start)
     printed = round_up_as_read(first)
     return Moments.of("start", [printed if printed < situation.td else first])
 

@@ -16,6 +16,7 @@ from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -51,8 +52,11 @@ _BAND: Final = 0.25
 # (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
+# Number of states in a flight at which its vibration is resolved and crossings are found within 0.5 % of the flight.
+_ENOUGH_STATES: Final = 200
 _NAMED: Final = 5  # largest number of parts that a sentence names
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
+_MORE_OFTEN: Final = "write the energies more often"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
@@ -70,21 +74,25 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
-    longest, those with a large position error come after the others.  Good residuals of modes, which differ at each tr,
-    are of like quality too, except among rigid times within 10 % of the longest.  The rest follows by error.
+    longest, those with a large position error come after the others.  Many modes have another residual at each tr.
+    There, all good pairs are of like quality; without a good pair, all that the band of the best leaves open are.  The
+    rest follows by error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
     situations = judged.situations
     room = np.repeat([get_limit_of_like_quality(each) for each in situations], 3)
-    alike = np.repeat([_get_limit_of_alike(each) for each in situations], 3)
+    residual = judged.columns["residual"]
     rows = order_by_quality(
         group,
-        judged.error,
+        Errors(
+            judged.error,
+            np.where(judged.modal & ~np.isnan(residual), residual, judged.error),
+            judged.modal & is_good_residual(residual, judged.columns["residual_high"]),
+        ),
         judged.columns["rigid_time"],
         judged.out_of_place,
         room,
-        alike,
     )
     is_kept = judged.recommendable[rows]
     for situation, (first, last) in zip(
@@ -105,39 +113,67 @@ def get_limit_of_like_quality(situation: Situation) -> float:
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
-def _get_limit_of_alike(situation: Situation) -> float:
-    """Return the error up to which all pairs are equally good [-].
+def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
+    """Return True for each residual of a good pair, with its upper bound, both of shape (n,) [-]; False for NaN."""
+    return (residual <= MOST_GOOD) & (highest <= _MOST_HIDDEN)
 
-    With many modes the residual differs at each tr.  A residual far below the limit of a good pair is worth less than a
-    longer rigid time.
+
+def find_limit_of_band(error: Samples, residual: Samples) -> Samples:
+    """Return the residual up to which pairs cannot be told from one with this ``residual``, in its shape [-].
+
+    That is its ``error``, which lies halfway to the upper bound of its band (in the square), but not beyond the limits
+    of a grade, and not above that of a release without any vibration.
     """
-    return MOST_GOOD if situation.basis == "modal" else 0.0
+    limit = np.maximum(error, residual)
+    for bound in (POOR_RESIDUAL, NOTHING_KEPT):
+        limit = np.where(residual <= bound, np.minimum(limit, bound), limit)
+    return limit
+
+
+class Errors(NamedTuple):
+    """Errors of n candidates, each of shape (n,): the ``error`` that ranks them, and what of it is ``expected`` [-].
+
+    The two differ by half of the band.  ``is_good`` is True for candidates that are all equally good.
+    """
+
+    error: Samples
+    expected: Samples
+    is_good: NDArray[np.bool_]
 
 
 def order_by_quality(
     group: NDArray[np.int32],
-    error: Samples,
+    errors: Errors,
     rigid: Samples,
     is_off: NDArray[np.bool_],
     room: Samples,
-    alike: Samples,
 ) -> NDArray[np.intp]:
     """Return the order of the candidates by group; in each group, the equally good best candidates come first.
 
-    Their error is within ``room`` of the smallest, or below ``alike``; both have shape (groups,), the other arguments
-    shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
+    These are the good ones.  In a group without any, they are those with an error within ``room``, of shape (groups,),
+    of the smallest, or with an expected error that the band of the best leaves open; the other arguments have shape
+    (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
     ``is_off`` come last, and before these those with an error further than ``room`` from the smallest.  The others
     follow by error.
     """
-    error = np.round(error, _DECIMALS)
-    smallest = _find_extremes(np.minimum, group, error, room.size)
-    is_like = error <= np.maximum(smallest + room, alike)[group]
+    error = np.round(errors.error, _DECIMALS)
+    expected = np.round(errors.expected, _DECIMALS)
+    groups = room.size
+    smallest = _find_extremes(np.minimum, group, error, groups)
+    is_best = error == smallest[group]
+    expected_of_best = _find_extremes(
+        np.minimum, group, np.where(is_best, expected, np.inf), groups
+    )
+    limit_of_band = find_limit_of_band(smallest, expected_of_best)
+    is_near = (error <= (smallest + room)[group]) | (expected <= limit_of_band[group])
+    has_good = np.bincount(group[errors.is_good], minlength=groups) > 0
+    is_like = np.where(has_good[group], errors.is_good, is_near)
     longest = _find_extremes(
-        np.maximum, group, np.where(is_like, rigid, -np.inf), room.size
+        np.maximum, group, np.where(is_like, rigid, -np.inf), groups
     )
     is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
     smallest_of_long = _find_extremes(
-        np.minimum, group, np.where(is_long, error, np.inf), room.size
+        np.minimum, group, np.where(is_long, error, np.inf), groups
     )
     is_worse = is_long & (error > (smallest_of_long + room)[group])
     return np.lexsort(
@@ -326,11 +362,28 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
+    cures = [*_ask_for_more_states(situation)]
+    for_modes = _describe_cure_for_modes(situation)
+    if not cures or for_modes != _MORE_OFTEN:
+        cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
+        f"{', '.join(cures)}, or compare with a finished switched run",
         kind=unknown,
     )
+
+
+def _ask_for_more_states(situation: Situation) -> Iterator[str]:
+    """Yield the output interval to ask for if few states lie in the flight up to td."""
+    start = situation.flight.start
+    begin = float(situation.history.time[0]) if start is None else start
+    states = situation.history.between(begin, situation.td)[0].size
+    if states < _ENOUGH_STATES and situation.td > begin:
+        interval = (situation.td - begin) / _ENOUGH_STATES
+        yield (
+            f"write the energies every {interval:.2g} or more often, because only {states} states lie in the flight "
+            "up to td"
+        )
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
@@ -342,7 +395,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also give {names} in `parts`, because {vibrates} together with the chosen parts"
-    return "write the energies more often"
+    return _MORE_OFTEN
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
@@ -384,7 +437,7 @@ def _list_causes_of_record(
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-                "write the energies more often",
+                f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
                 kind=f"the record has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )

@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 _SOLVER_ERROR: Final = 1e-5
 # A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
 _FAINT: Final = 1e-4
+# An oscillator that describes this share of the record is used; no modes are searched for that describe more of it.
+_MOST_OF_RECORD: Final = 0.5
 # Rounding error in units of the last digit: a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
@@ -84,7 +86,7 @@ def _find_faint_fluctuation(history: History, start: float) -> float:
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
     ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
     """
-    energies = history.between(start, float(history.time[-1]))[1]
+    energies = history.between(start, history.end)[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
     highest = _find_highest_energy(history)
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
@@ -276,11 +278,7 @@ def examine_td(
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
-    # If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
-    if seen.refusal and seen.flight:
-        fitted_at = (seen.flight.start + seen.flight.end) / 2
-    else:
-        fitted_at = td
+    fitted_at = _choose_time_of_fit(seen, td)
     is_shown = seen.flight is not None or seen.refusal is not None
     span: Span | None = None
     fit: Identification | None = None
@@ -299,8 +297,9 @@ def examine_td(
         )
     described = _skip_first_quarter(history, fit, span)
     quiet: QuietTime | None = None
-    if described is None and not is_shown:
-        # Only the energy can show a flight.
+    is_given = settings.oscillator is not None or settings.fit_window is not None
+    if not (is_shown or _covers_most(history, described) or (described and is_given)):
+        # Only the energy can show a flight, or more of it than an oscillator describes.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -308,7 +307,7 @@ def examine_td(
 
             guess = _get_quiet_window(history, quiet)
             modes = find_described(history, td, guess)
-            described = _describe_by_modes(modes)
+            described = _choose_longer_window(described, modes)
     flight = choose_flight(
         history,
         td,
@@ -318,17 +317,25 @@ def examine_td(
         after=settings.after,
         landing=settings.landing,
     )
-    is_given = settings.oscillator is not None
-    is_prescribed = is_given or settings.fit_window is not None
-    evidence = Evidence(fit, span, is_given, prescribed=is_prescribed)
+    evidence = Evidence(fit, span, settings.oscillator is not None, prescribed=is_given)
     situation = Situation(history, td, settings, flight, evidence)
     if not settings.replay:
         return situation
     is_flying = seen.flight is not None and not seen.refusal
     models = _find_other_models(situation, is_flying=is_flying)
-    if models:
-        return replace(situation, evidence=evidence._replace(models=models))
-    return situation
+    if not models:
+        return situation
+    return replace(situation, evidence=evidence._replace(models=models))
+
+
+def _choose_time_of_fit(seen: Seen, td: float) -> float:
+    """Return the time around which an oscillator is searched for [time].
+
+    If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
+    """
+    if seen.refusal and seen.flight:
+        return (seen.flight.start + seen.flight.end) / 2
+    return td
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
@@ -358,8 +365,8 @@ def _find_other_models(
     history = situation.history
     td = situation.td
     flight = situation.flight
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     # Without evidence of the next contact, nothing is known about the time after td.
     is_described = situation.evidence.span is not None or flight.source == "oscillator"
     end = flight.end or (last if is_flying or is_described else td)
@@ -417,23 +424,39 @@ def _get_bounds(history: History, seen: Seen) -> Span:
     """Return the flight that the evidence shows, or else the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
-    return Span(float(history.time[0]), float(history.time[-1]))
+    return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
     """Return the window in which the energy shows no load, up to the end of the record if no contact is seen."""
     if quiet is None:
         return None
-    return Span(
-        quiet.start, float(history.time[-1]) if quiet.end is None else quiet.end
-    )
+    return Span(quiet.start, history.end if quiet.end is None else quiet.end)
 
 
-def _describe_by_modes(modes: ModalWindow | None) -> Described | None:
-    """Return the window that modes describe, with the energy of their vibration; None without modes."""
+def _covers_most(history: History, described: Described | None) -> bool:
+    """Return True if a window is so long that no modes are searched for that describe more of the record."""
+    if described is None:
+        return False
+    record = float(history.time[-1] - history.time[0])
+    return described.end - described.start >= _MOST_OF_RECORD * record
+
+
+def _choose_longer_window(
+    by_oscillator: Described | None, modes: ModalWindow | None
+) -> Described | None:
+    """Return the window of an oscillator, or a longer one that modes describe; None without either.
+
+    Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
+    modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.
+    """
     if modes is None:
-        return None
-    return Described(*modes.span, modes.vibration.vibration_energy)
+        return by_oscillator
+    by_modes = Described(*modes.span, modes.vibration.vibration_energy)
+    if by_oscillator is None:
+        return by_modes
+    is_longer = by_modes.end - by_modes.start > by_oscillator.end - by_oscillator.start
+    return by_modes if is_longer and modes.vibration.is_exact else by_oscillator
 
 
 def _skip_first_quarter(
@@ -446,7 +469,7 @@ def _skip_first_quarter(
     """
     if span is None or fit is None or fit.mode is None:
         return None
-    quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
+    quarter = np.pi / 2 / fit.mode.omega if span.start > history.start else 0.0
     return Described(
         min(span.start + quarter, span.end),
         span.end,

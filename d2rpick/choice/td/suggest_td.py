@@ -10,10 +10,12 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.quality import (
+    EQUALLY_GOOD,
     LIKE_LEVELS,
-    MOST_GOOD,
     ROUNDING,
+    find_limit_of_band,
     get_limit_of_like_quality,
+    is_good_residual,
     rank_candidates,
     rate_certainty_of_tr,
 )
@@ -24,7 +26,7 @@ from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
-from d2rpick.vibration.measures import TOLERATED_GROWTH, kinetic_share, vertices
+from d2rpick.vibration.measures import kinetic_share, vertices
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -68,8 +70,8 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     history = situation.history
     if start is None:
         return np.zeros(times.shape)
-    start = max(start, float(history.time[0]))
-    if situation.evidence.has_model or start >= history.time[-1]:
+    start = max(start, history.start)
+    if situation.evidence.has_model or start >= history.end:
         return np.maximum(times - start, 0.0)
     time, energy = history.between(np.nextafter(start, np.inf), np.inf)
     time = np.append(start, time)
@@ -165,7 +167,7 @@ def choose_td(
     elif chosen is not None:
         if times is None:
             times = list_offered_times(situation, inside, STEPS)[0].tolist()
-        earliest = float(history.time[0]) if since is None else since
+        earliest = history.start if since is None else since
         td = _find_unbeaten(
             td,
             times,
@@ -200,7 +202,7 @@ def list_offered_times(
         grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
     # A run that ends at td is useless.
-    return times[times < situation.history.time[-1]], set(peaks.tolist())
+    return times[times < situation.history.end], set(peaks.tolist())
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
@@ -356,19 +358,31 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
 
 
 def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
-    """Return the first situation with the most certain flight, at the start, middle or end of the window."""
+    """Return the first situation with the most certain flight, at the start, middle or end of the window.
+
+    Of flights of equal certainty, one that covers some of the window goes before another, which only ends in it.
+    """
     low, high = window
     situations = []
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
-        if _rate_certainty(situations[-1]) == (False, 0):
+        if _rate_certainty(situations[-1], window) == (False, 0, False):
             break  # no situation can be more certain
-    return min(situations, key=_rate_certainty)
+    return min(situations, key=lambda situation: _rate_certainty(situation, window))
 
 
-def _rate_certainty(situation: Situation) -> tuple[bool, int]:
+def _rate_certainty(
+    situation: Situation, window: tuple[float, float]
+) -> tuple[bool, int, bool]:
     """Return a sort key for the certainty that td lies in a flight: the smallest is the most certain."""
-    return not situation.in_flight, SOURCES.index(situation.flight.source)
+    low, high = window
+    start, end = situation.flight.within(situation.history.time)
+    only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
+    return (
+        not situation.in_flight,
+        SOURCES.index(situation.flight.source),
+        only_ends_in_it,
+    )
 
 
 def _choose_by_residual(
@@ -418,7 +432,7 @@ def _choose_by_modes(
 
     The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
     more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
-    window, the smallest residual decides.
+    window, it is the longest of those whose residual the band of the best leaves open.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -426,27 +440,36 @@ def _choose_by_modes(
         return _choose_by_residual(situation, window, look)
     first = max(start, compared.first)
     last = min(window[1], compared.last)
-    choices: list[list[Choice]] = []
+    pairs: list[Choice] = []
     for share in _LEAST_RIGID:
         times = _list_times_by_modes(situation, (window[0], first, last), share)
-        pairs = _select_acceptable(look(td) for td in times)
+        pairs += _select_acceptable(look(td) for td in times)
         least_time = share * (last - first)
-        choices.append(
-            [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
-        )
-        if not times or any(best.error <= MOST_GOOD for _, best in choices[-1]):
-            break
-    if not choices[0]:
+        good = [pair for pair in pairs if _is_good(pair[1])]
+        long = [pair for pair in good if pair[1].rigid_time >= least_time]
+        if long:
+            return _find_best_of_long(long)[0].td, _get_td(_find_longest(pairs))
+    if not pairs:
         return _choose_by_residual(situation, window, look)
-    good = [pair for pair in choices[-1] if pair[1].error <= MOST_GOOD]
-    longest = _get_td(_find_longest(choices[0]))
-    if good:
-        return _find_best_of_long(good)[0].td, longest
-    least_error = min(best.error for _, best in choices[0])
-    # The error may be larger by as much as a tr within its timing tolerance may add.
-    limit = least_error + TOLERATED_GROWTH
-    alike = _find_longest(pair for pair in choices[0] if pair[1].error <= limit)
-    return _get_td(alike), longest
+    alike = good or _select_within_band(pairs)
+    return _get_td(_find_longest(alike)), _get_td(_find_longest(pairs))
+
+
+def _is_good(pair: Pair) -> bool:
+    """Return True if the residual of a pair is that of a good one."""
+    residual, highest = np.array([pair.residual, pair.residual_high], np.float64)
+    return bool(is_good_residual(residual, highest))
+
+
+def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
+    """Return the pairs whose error the band of the best one leaves open, or that is hardly larger."""
+    errors = np.array([pair.error for _, pair in pairs])
+    highest = np.array([pair.residual_high for _, pair in pairs], np.float64)
+    doubted = np.sqrt((errors**2 + np.fmax(highest, errors) ** 2) / 2)
+    best = int(np.argmin(doubted))
+    limit_of_band = find_limit_of_band(doubted[best], errors[best])
+    limit = max(float(limit_of_band), float(errors[best]) + EQUALLY_GOOD)
+    return [pair for pair, error in zip(pairs, errors, strict=True) if error <= limit]
 
 
 def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
