@@ -128,7 +128,6 @@ def _build_lower_sections(
     answer: PairSuggestion, record: page.PageContext
 ) -> Iterator[Markup]:
     yield build_section("Candidates", *_build_candidates(answer))
-    yield page.build_mismatch_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
     if answer.recommended and answer.decision:
         yield page.build_solver_input(
@@ -215,7 +214,6 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
     yield build_section(
         "Measures", build_pairs((name, format_short(value)) for name, value in measures)
     )
-    yield page.build_mismatch_table(candidate)
     if answer.switched:
         yield _build_comparison(
             answer.switched, record.switched.files if record.switched else ()

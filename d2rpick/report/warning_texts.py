@@ -103,11 +103,6 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "displaced by the stated length, which is more than 1 % of its path. The next contact shifts.",
             "Leave the moving part deformable, choose another tr, or accept the displacement.",
         ),
-        "part-without-sign": Explanation(
-            "The direction of the deformation of this part is unknown. d2rpick treats the energy of the part as "
-            "undetected, so the upper bound of the residual is higher.",
-            "Nothing to do if the part has little energy. Otherwise write the energies more often.",
-        ),
         "partly-rigid": Explanation(
             "In the stated interval, some of the chosen parts were rigid and others were deformable. d2rpick does not "
             "use this interval as a rigid window.",
