@@ -107,9 +107,9 @@ def draw_rollover() -> Figure:
     right_axes.axhline(1.0, color=SWITCHED, linewidth=0.8)
     right_axes.set(ylabel="mean energy after td, over the reference")
     for axes in (left_axes, right_axes):
-        axes.axvspan(0, 88.5, color=SWITCHED, alpha=0.1, linewidth=0, label="trip")
+        axes.axvspan(0, 91.0, color=SWITCHED, alpha=0.1, linewidth=0, label="trip")
         axes.axvline(
-            88.58, color=GOOD, linestyle="--", linewidth=1, label="recommended tr"
+            92.46, color=GOOD, linestyle="--", linewidth=1, label="recommended tr"
         )
         axes.set_xlabel("tr [ms]")
         axes.legend(fontsize="x-small")

@@ -57,6 +57,13 @@ class RunQuestion(NamedTuple):
         return self.request.deck if self.of_this_run else None
 
     @property
+    def unused_deck(self) -> str | None:
+        """The deck that the user named, if it belongs to another model and is not used; otherwise None."""
+        if self.of_this_run or self.request.deck_in_folder:
+            return None
+        return self.request.deck
+
+    @property
     def options(self) -> tuple[str, ...]:
         """Options that follow the times in the command line that repeats the question."""
         from d2rpick.report.tables import (

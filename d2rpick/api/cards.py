@@ -146,6 +146,14 @@ class Cards:
             }
         )
 
+    @classmethod
+    def for_run(cls, run: Run, options: CardOptions) -> Cards:
+        """Check the arguments of Python; times with a unit are converted to the unit of the run."""
+        from d2rpick.api.times import TimeArguments  # imported here to start faster
+
+        times = TimeArguments.of_run(run)
+        return cls.of(times.convert_options(options, list_options(Cards)))  # type: ignore[arg-type]
+
     @property
     def given(self) -> list[str]:
         """Names of the given options, without the solver."""

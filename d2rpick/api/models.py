@@ -169,6 +169,9 @@ class Box:
         "T",
         many=True,
     )
+    with_step: bool = make_option(
+        "Switch the step too, as one rigid body with the box.", "flag", default=False
+    )
     drop: float | None = make_option(
         "Height in m from which the box falls on the ground, instead of tripping on the sled.",
         *(NOT_NEGATIVE, "HEIGHT"),
@@ -214,9 +217,10 @@ class Box:
     def __post_init__(self) -> None:
         """Refuse contradictory arguments."""
         if self.scan:
-            lost = [name for name in ("tr", "write_as") if getattr(self, name)] + [
-                "drop"
-            ] * (self.drop is not None)
+            excluded = ("tr", "with_step", "write_as")
+            lost = [name for name in excluded if getattr(self, name)] + ["drop"] * (
+                self.drop is not None
+            )
             if lost:
                 raise ArgumentError(
                     f"--scan and --{make_option_name(lost[0])} exclude each other"
@@ -225,6 +229,8 @@ class Box:
                 raise ArgumentError("--scan takes one --td")
         elif self.jobs:
             raise ArgumentError("--jobs needs --scan")
+        elif self.with_step and not self.tr:
+            raise ArgumentError("--with-step needs --tr and --td")
         else:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
@@ -264,7 +270,10 @@ class Box:
         """The windows in which the box is rigid."""
         from d2rpick.models.box_run import RigidWindow
 
-        return tuple(map(RigidWindow, self.tr, self.td))
+        return tuple(
+            RigidWindow(tr, td, self.with_step)
+            for tr, td in zip(self.tr, self.td, strict=True)
+        )
 
     def simulated(self, *rigid: RigidWindow) -> Record:
         """Compute the run with these windows."""

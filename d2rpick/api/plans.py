@@ -194,7 +194,8 @@ class Plan(RunAnswer, planning.RunPlan):
         It contains all new windows if ``every`` is True, else only the windows that the history supports.
         """
         return self.printed(
-            Cards.of(options), every=arguments.check_flag("every", every, False)
+            Cards.for_run(self.question.run, options),
+            every=arguments.check_flag("every", every, False),
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:

@@ -80,7 +80,7 @@ class ReadingOptions:
         *("file", "FILE"),
     )
     history: tuple[str, ...] = make_option(
-        "Energy history of the reference run to judge by: file, folder or glob; repeatable.",
+        "History of the reference run, by which the times are judged: file, folder or glob; repeatable.",
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = make_option(

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
 from d2rpick.api.cards import parse_id_ranges
+from d2rpick.api.times import TimeArguments
 from d2rpick.base.options import NOT_NEGATIVE
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.api.arguments import Parts
+    from d2rpick.api.arguments import Parts, Time
     from d2rpick.running.events import Event
 
 
@@ -33,8 +34,8 @@ def first(
     output_dir: arguments.Path,
     *,
     parts: Parts | None = None,
-    wait: float | None = None,
-    after: float | None = None,
+    wait: Time | None = None,
+    after: Time | None = None,
     overwrite: bool | None = False,
 ) -> FirstRun:
     """Write a copy of a deck so that its first run switches the parts by itself, as ``d2rpick first`` does.
@@ -48,10 +49,10 @@ def first(
     parts : int, str or sequence of these, optional
         Ids and id ranges of the parts to switch.  Default (Radioss): the parts of the rigid bodies that the engine file
         deactivates.
-    wait : float, optional
-        Time without force that counts as flight [time].  Default: half of the longest inner period, by masses and
-        springs of the deck.
-    after : float, optional
+    wait : float or text, optional
+        Time without force that counts as flight [time]; a string such as ``"5ms"`` if the deck names its units.
+        Default: half of the longest inner period, by masses and springs of the deck.
+    after : float or text, optional
         Earliest time at which parts become rigid [time].
     overwrite : bool
         Replace files that exist.
@@ -81,11 +82,12 @@ def first(
     from d2rpick.running.first import first_card
 
     names = arguments.list_part_names("parts", parts)
-    times = (
-        arguments.check_optional_number("wait", wait, NOT_NEGATIVE),
-        arguments.check_optional_number("after", after, NOT_NEGATIVE),
-    )
     main = arguments.check_path("deck", deck)
+    of_deck = TimeArguments.of_deck(main)
+    times = (
+        of_deck.check_time("wait", wait, NOT_NEGATIVE),
+        of_deck.check_time("after", after, NOT_NEGATIVE),
+    )
     folder = arguments.check_path("output_dir", output_dir)
     copies = first_card(main, parse_id_ranges("parts", names), *times)
     files = write_deck(
@@ -101,7 +103,7 @@ def follow(
     run: arguments.Path,
     *,
     parts: Parts | None = None,
-    wait: float | None = None,
+    wait: Time | None = None,
     deck: arguments.Path | None = None,
     lasting: float | None = None,
 ) -> Iterator[Event]:
@@ -113,8 +115,9 @@ def follow(
         Folder, T01, glstat, matsum or binout, or a pattern for these, which need not be there yet.
     parts : int, str or sequence of these, optional
         The parts to switch.
-    wait : float, optional
-        Time without a force that counts as flight [time].  Default: half of the longest inner period that is known.
+    wait : float or text, optional
+        Time without a force that counts as flight [time]; a string such as ``"5ms"`` if ``deck`` names its units.
+        Default: half of the longest inner period that is known.
     deck : path, optional
         Main deck of the run, which defines gravity, supports, bodies, and the period of parts on springs.
     lasting : float, optional
@@ -140,11 +143,12 @@ def follow(
 
     selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
-    if deck is not None:
+    main = None if deck is None else arguments.check_path("deck", deck)
+    if main is not None:
         from d2rpick.deck import read_inventory  # imported here to start faster
 
-        inventory = read_inventory(arguments.check_path("deck", deck))
-    time = arguments.check_optional_number("wait", wait)
+        inventory = read_inventory(main)
+    time = TimeArguments.of_deck(main).check_time("wait", wait)
     seconds = arguments.check_optional_number("lasting", lasting)
     return watch.follow(
         [arguments.check_path("run", run)], selection, time, inventory, lasting=seconds

@@ -72,7 +72,7 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
-        return self.printed(Cards.of(options))
+        return self.printed(Cards.for_run(self.question.run, options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; return None without a recommendation."""

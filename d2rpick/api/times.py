@@ -47,6 +47,11 @@ class TimeArguments:
         self._find_unit = find_unit
 
     @classmethod
+    def of_deck(cls, deck: str | None) -> TimeArguments:
+        """Return a check that converts to the unit of a deck, which only Radioss decks name."""
+        return cls(lambda: find_unit_of_deck(deck))
+
+    @classmethod
     def of_run(cls, run: Run | None) -> TimeArguments:
         """Return a check that converts to the unit of a run."""
         return cls(lambda: find_unit_of_run(run))
@@ -106,6 +111,21 @@ def is_time_with_unit(text: str) -> bool:
     [True, True, False, False]
     """
     return parse_seconds(text) is not None
+
+
+def find_unit_of_deck(deck: str | None) -> TimeUnit:
+    """Return the time unit that a deck names; empty if it names none, as in LS-DYNA.
+
+    Raises
+    ------
+    DeckError
+        If the deck cannot be read.
+    """
+    if deck is None:
+        return TimeUnit("", "the run, since no deck is given")
+    from d2rpick.deck import find_time_unit  # imported here to start faster
+
+    return TimeUnit(find_time_unit(deck), deck)
 
 
 def find_unit_of_run(run: Run | None) -> TimeUnit:

@@ -27,7 +27,7 @@ from d2rpick.choice.pair.decision import (
     Decision,
     decide,
 )
-from d2rpick.choice.pair.grades import POOR
+from d2rpick.choice.pair.grades import GOOD, POOR
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     ROUNDING,
@@ -221,8 +221,9 @@ class AcceptableWindow(NamedTuple):
 class PairSuggestion(AnswerAtTd):
     """The answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
-    ``td_window`` is the window in which td was chosen, None for a given td; ``longer`` is the longest acceptable pair
-    in it, if much rigid time was given up for quality.
+    ``td_window`` is the window in which td was chosen, None for a given td; ``compared_td`` is the part of it in which
+    all td were compared, since they keep the margin.  ``longer`` is the longest acceptable pair in the window, if much
+    rigid time was given up for quality.
     """
 
     situation: Situation
@@ -231,6 +232,7 @@ class PairSuggestion(AnswerAtTd):
     cautions: tuple[Caution, ...]
     health: Health | None = None
     td_window: tuple[float, float] | None = None
+    compared_td: tuple[float, float] | None = None
     longer: Pair | None = None
 
     @property
@@ -297,7 +299,7 @@ class PairSuggestion(AnswerAtTd):
             self.situation,
             best,
             better=self._good_pair,
-            best_of=None if self.clearly_better else self.td_window,
+            best_of=None if self.clearly_better else self.compared_td,
         )
 
     @property
@@ -346,6 +348,14 @@ class PairSuggestion(AnswerAtTd):
             for td in (better.td, recommended.td)
         ]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
+
+
+def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
+    """Return the verdict on the recommended pair; if it is not good, with the better pair, which needs a search."""
+    decision = answer.decision
+    if decision is None or decision.reaches(GOOD) or answer.better_pair:
+        return decision
+    return suggest_at(answer.situation, ranked=answer.candidates).decision
 
 
 def suggest_in_history(
@@ -512,7 +522,10 @@ def suggest_in_run(
         chosen = choose_td(reference.history, td, settings, since, times)
         answer = suggest_at(chosen.situation)
         answer = replace(
-            answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
+            answer,
+            td_window=chosen.window,
+            compared_td=chosen.inside,
+            longer=chosen.given_up(answer.recommended),
         )
     else:
         situation = examine_td(reference.history, td, settings)

@@ -27,7 +27,7 @@ def complete_printing(printing: Printing, history: History) -> Printing:
     """
     solver = printing.solver or find_solver(history.format)
     ids = printing.part or tuple(part.id for part in history.parts or ())
-    end = float(history.time[-1]) if printing.end is None else printing.end
+    end = history.end if printing.end is None else printing.end
     printing = printing._replace(solver=solver, part=ids, end=end)
     if "contact" in SOLVERS[solver].takes:
         printing = _add_pushes(printing, history, SOLVERS[solver].title)

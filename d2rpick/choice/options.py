@@ -151,7 +151,7 @@ class ChoiceOptions:
         metadata=_describe_use(),
     )
     keep_vibration: bool = make_option(
-        "Grade the vibration by its own error, also if that is small in the next contact.",
+        "Grade the vibration by the residual alone, even if the next contact has far more energy.",
         "flag",
         default=False,
         metadata=_describe_use(),

@@ -88,7 +88,8 @@ def replay(motion: Motion, output: Output) -> None:
 def rollover(box: Box, output: Output) -> None:
     """Compute a planar box that trips over the curb of a braking sled and rolls, or falls and bounces.  SI units.
 
-    The box is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.
+    The box is deformable throughout, or rigid from each tr to its td.  The step that meets the curb stays deformable,
+    or is switched together with the box (--with-step).
     The columns are time, position, roll, velocities and energies of the box, the momentum of box and step, and the
     energy balance of the model.  The file glstat contains the energies of the model, matsum the energies of each part.
 

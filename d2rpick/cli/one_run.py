@@ -33,15 +33,17 @@ from d2rpick.cli.options import (
 from d2rpick.cli.output import (
     IN_WORDS,
     Output,
+    VerdictOnPair,
     check_switched,
     open_with_output,
     replace_arguments_for_people,
 )
-from d2rpick.cli.progress import show_reading
+from d2rpick.cli.progress import show_computing, show_reading
 from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
+    from d2rpick.api.asked import RunQuestion
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -153,7 +155,8 @@ def suggest(
     output.check(cards)
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-    answer = suggest_for_question(question, wanted)
+    with show_computing(quiet=output.quiet):
+        answer = suggest_for_question(question, wanted)
     new_cautions = [
         caution
         for caution in answer.cautions
@@ -175,11 +178,24 @@ def suggest(
             ]
         output.card(judged_card, new_cautions)
         decision = judged_card.worst if judged_card else None
-        return output.finish_by_verdict(decision, question.settings.min_quality)
-    output.answer(answer)
-    # a given td gets an answer even if it is poor; only a card must not be used without a check
+    else:
+        output.answer(answer)
+        decision = answer.decision
+    # A given td gets an answer even if it is poor; the answer and the card say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
-    return output.finish_by_verdict(answer.decision, min_quality)
+    _finish_answer(output, question, decision, min_quality)
+
+
+def _finish_answer(
+    output: Output,
+    question: RunQuestion,
+    decision: VerdictOnPair | None,
+    min_quality: str,
+) -> None:
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a deck that was given was not used."""
+    if question.unused_deck:
+        output.finish_without_deck(question.unused_deck)
+    output.finish_by_verdict(decision, min_quality)
 
 
 @options.make_command
@@ -218,9 +234,9 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    The td form a grid over --td-window or the longest flight, with every peak of the energy; each is judged as by
-    `suggest --td`.  The table lists the pairs that no other pair beats in both error and rigid time.  d2rpick also
-    names the nearest td with half the error.
+    It compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.  It
+    judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and rigid
+    time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -237,7 +253,8 @@ def explore(
     output.check(cards)
     with open_with_output(request, output) as (run, output):
         question = ask_run(run, request, merge=cards.merge)
-    answer = explore_for_question(question, td, td_window, steps)
+    with show_computing(quiet=output.quiet):
+        answer = explore_for_question(question, td, td_window, steps)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
@@ -245,7 +262,7 @@ def explore(
     output.answer(answer)
     chosen = answer.recommended
     decision = chosen.decision if chosen else None
-    output.finish_by_verdict(decision, question.settings.min_quality)
+    _finish_answer(output, question, decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -300,13 +317,14 @@ def verify(
         with show_reading(switched, quiet=output.quiet):
             switched_run = open_requested_run(request, switched)
         output.spare(switched_run.sources)
-    answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
+    with show_computing(quiet=output.quiet):
+        answer = judge_pair(question, tr, td, switched_run, min_mean_energy)
     output.notes(question.reference.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     output.answer(answer)
-    output.finish_by_verdict(answer.decision, question.settings.min_quality)
+    _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 
 @options.make_command
@@ -446,9 +464,9 @@ def plan(
         ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
         earlier = open_requested_run(request, before) if before else None
-    answer = plan_for_question(
-        question, min_rigid, options.read_windows_in(done) if done else (), earlier
-    )
+    done_windows = options.read_windows_in(done) if done else ()
+    with show_computing(quiet=output.quiet):
+        answer = plan_for_question(question, min_rigid, done_windows, earlier)
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), (), cards)
@@ -463,16 +481,16 @@ def plan(
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        return output.finish(
-            objection=not (
-                output.card(judged_card, _select_new_cautions(judged_card, answer))
-                and passed
-            )
-        )
-    if judged_card:
-        output.notes(judged_card.card.notes, ())
-    output.answer(answer, checked if form == "table" else "", every=every)
-    return output.finish(objection=not (answer.supported and passed))
+        passed &= output.card(judged_card, _select_new_cautions(judged_card, answer))
+    else:
+        if judged_card:
+            output.notes(judged_card.card.notes, ())
+            answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
+        output.answer(answer, checked if form == "table" else "", every=every)
+        passed &= bool(answer.supported)
+    if question.unused_deck:
+        output.finish_without_deck(question.unused_deck)
+    output.finish(objection=not passed)
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:

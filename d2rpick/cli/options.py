@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from copy import copy
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Final
 
@@ -65,6 +66,9 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 }
 # Options that write files, which would already exist if the command is repeated.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
+_ASKS_FOR_SETTINGS: Final = "--show-settings"
+# Key in the context: True if only the settings are to be shown.
+_SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
     ParameterSource.ENVIRONMENT: "environment",
@@ -79,6 +83,7 @@ class Command(Documented):
         """Read the command line. The settings file gives the options that neither it nor the environment sets."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
+        ctx.meta[_SETTINGS_ONLY] = _ASKS_FOR_SETTINGS in args
         table, source, ctx.meta["d2rpick.unused"] = find_nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
@@ -93,6 +98,13 @@ class Command(Documented):
                 ctx.meta["d2rpick.command"], words
             )
         return remaining
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the parameters; none of them is required if only the settings are to be shown."""
+        parameters = super().get_params(ctx)
+        if ctx.meta.get(_SETTINGS_ONLY):
+            return [_make_optional(parameter) for parameter in parameters]
+        return parameters
 
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
@@ -136,6 +148,13 @@ class Command(Documented):
             return super().invoke(ctx)
         except ArgumentError as error:
             raise click.UsageError(replace_arguments(str(error)), ctx) from error
+
+
+def _make_optional(parameter: click.Parameter) -> click.Parameter:
+    """Return a copy of a parameter that is not required."""
+    optional = copy(parameter)
+    optional.required = False
+    return optional
 
 
 class Either(click.Option):
@@ -369,7 +388,7 @@ _FLAGS: Final = [
     for names, text in (
         (["--debug"], "Show the traceback of an error."),
         (
-            ["--show-settings"],
+            [_ASKS_FOR_SETTINGS],
             "Print every option with its value and its source, and do nothing else.",
         ),
         (

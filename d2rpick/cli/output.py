@@ -43,7 +43,10 @@ _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "ma
 _PRINTED: Final = (".pdf", ".doc", ".docx")
 # Lines of a result in bold: recommendations, verdicts, and changes of a deck.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
-_ANSWER: Final = rf"(?m)^(\* |({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
+_ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
+# Code of the warning about a truncated file, and the words of the readers' notes that say the same.
+_TRUNCATED: Final = "truncated-input"
+_TRUNCATION: Final = "ends within"
 
 
 # Options that have other names than the arguments that messages name in backticks.
@@ -293,10 +296,22 @@ class Output:
         """Print the notes of a reader on omissions, and the warnings."""
         if self.quiet:
             return
+        listed_cautions = list(cautions)
+        is_truncated = any(caution.code == _TRUNCATED for caution in listed_cautions)
         for note in notes:
-            tell(f"note: {note}")
-        for caution in cautions:
+            if not (is_truncated and _TRUNCATION in note):
+                tell(f"note: {note}")
+        for caution in listed_cautions:
             tell(f"warning: {caution.code}: {caution.message}")
+
+    def finish_without_deck(self, deck: str) -> None:
+        """Exit with code 1, because a deck that was given belongs to another model and was not used."""
+        if not self.exit_zero:
+            tell(
+                f"d2rpick: exit code {OBJECTION}: {deck} is not the deck of this run, so the answer does not use it; "
+                "give the right deck, or leave out --deck"
+            )
+        self.finish(objection=True)
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file completely or not at all; raise D2RPickError if it cannot be written."""

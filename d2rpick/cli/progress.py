@@ -43,6 +43,15 @@ def show_reading(
         )
 
 
+@contextmanager
+def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
+    """Show on a terminal how long the computation of an answer has taken [s], unless ``quiet``."""
+    with show_progress(
+        lambda seconds: f"computing ... {seconds:.0f} s", quiet=quiet, period=period
+    ):
+        yield
+
+
 class Count:
     """The number of finished runs out of ``total``; ``taken`` of them needed no computation."""
 

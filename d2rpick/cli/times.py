@@ -89,6 +89,10 @@ def _find_unit(ctx: click.Context) -> tuple[str, str]:
     if ctx.command.name in _IN_SECONDS:
         return "s", ""
     runs = _list_runs(ctx)
+    if not runs and (deck := ctx.params.get("deck")):
+        from d2rpick.api.times import find_unit_of_deck
+
+        return find_unit_of_deck(deck)
     if not runs:
         return "", "the command line, which names no run"
     if any("-" in names for names in runs):

@@ -54,6 +54,28 @@ def read_inventory(path: str) -> Inventory:
     return inventory
 
 
+def find_time_unit(path: str) -> str:
+    """Return the time unit that a Radioss run names for deck and computation; empty if it names none or two.
+
+    Decks of LS-DYNA name no units.
+
+    Raises
+    ------
+    DeckError
+        If the deck cannot be read.
+    """
+    from d2rpick.deck.radioss_files import (
+        list_run_files,
+    )  # imported here to start faster
+
+    if not list_run_files(path):
+        return ""
+    from d2rpick.deck.radioss_run import find_time_units, read_run
+
+    of_deck, of_run = find_time_units(read_run(path))
+    return of_deck if of_deck == of_run else ""
+
+
 def find_main_decks(folder: str) -> list[str]:
     """Return the paths of the main decks in a folder and its subfolders.
 

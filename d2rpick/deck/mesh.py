@@ -277,10 +277,6 @@ class Elements(NamedTuple):
     part: Places
     nodes: Places
 
-    def of(self, part: int) -> Places:
-        """Return the nodes of the elements of a part."""
-        return np.asarray(self.nodes[self.part == part])
-
 
 class Mesh(NamedTuple):
     """Elements of a deck by kind, with their node table and its coordinates.

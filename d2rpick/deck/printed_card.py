@@ -102,6 +102,7 @@ class PrintedCard:
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
+    ``fewest_cycles`` are those of a run whose largest time step holds throughout, as with sensors; else None.
     """
 
     text: str
@@ -110,6 +111,7 @@ class PrintedCard:
     notes: tuple[str, ...] = ()
     starter: str = ""
     sensors: Mapping[int, int] = field(default_factory=dict)
+    fewest_cycles: int | None = None
 
 
 class CardSolver(NamedTuple):

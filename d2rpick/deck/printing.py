@@ -368,8 +368,9 @@ def _print_sensors(
         for leg in plan_legs(windows, end, printing.step_cap)
         if leg.cap is not None
     )
+    fewest_cycles = round(end / cap)
     step_warning = (
-        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
+        f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
     # The note is also written to the file, which may be used without the card.
@@ -395,7 +396,10 @@ def _print_sensors(
         texts,
     )
     return replace(
-        card, sensors=dict.fromkeys(ids, last), notes=(*card.notes, step_warning)
+        card,
+        sensors=dict.fromkeys(ids, last),
+        notes=(*card.notes, step_warning),
+        fewest_cycles=fewest_cycles,
     )
 
 

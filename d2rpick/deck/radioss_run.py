@@ -11,11 +11,12 @@ import os
 import re
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError, choose_verb, format_ranges, name_units
 from d2rpick.deck.card import CardField, Value
+from d2rpick.deck.radioss_columns import UNITS
 from d2rpick.deck.radioss_deck import (
     RadiossLeg,
     Starter,
@@ -93,6 +94,10 @@ class RadiossRun:
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
+
+
+# Number of lines of /BEGIN: the name of the run, the version, and two lines of units.
+_LINES_OF_BEGIN: Final = 4
 
 
 def read_run(path: str, content: bytes | None = None) -> RadiossRun:
@@ -403,6 +408,19 @@ def find_rigid_parts(
         for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
     return whole_parts
+
+
+def find_time_units(run: RadiossRun) -> tuple[str, str]:
+    """Return the time units of the starter deck and of the computation, as /BEGIN names them; empty if it does not."""
+    cards = run.starter.named("BEGIN") if run.starter else ()
+    rows = next((card.rows for card in cards), ())
+    if len(rows) < _LINES_OF_BEGIN:
+        return "", ""
+    of_deck, of_run = (
+        UNITS["Time"].cut(row.text).strip().lower().replace("mus", "us")
+        for row in rows[2:_LINES_OF_BEGIN]
+    )
+    return of_deck, of_run
 
 
 def find_parts_off(run: RadiossRun) -> tuple[int, ...]:

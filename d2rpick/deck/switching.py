@@ -133,13 +133,6 @@ class SwitchSet:
         """Return the fields that cannot be read, with the reason."""
         return ((value.field, value.problem) for value in self.values if value.problem)
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Return the names of the parameters that the card uses."""
-        return tuple(
-            dict.fromkeys(name for value in self.values for name in value.parameters)
-        )
-
 
 def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
     """Return all switching cards of a deck, in reading order."""

@@ -19,7 +19,7 @@ from d2rpick.deck.engine_files import (
 )
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_bodies import find_replaced_bodies
-from d2rpick.deck.radioss_columns import BEGIN, RIGID_BODY, UNITS
+from d2rpick.deck.radioss_columns import BEGIN, RIGID_BODY
 from d2rpick.deck.radioss_deck import (
     RadiossLeg,
     Starter,
@@ -33,7 +33,12 @@ from d2rpick.deck.radioss_deck import (
     split_keyword,
 )
 from d2rpick.deck.radioss_files import find_root, list_run_files
-from d2rpick.deck.radioss_run import RadiossRun, find_parts_off, read_run
+from d2rpick.deck.radioss_run import (
+    RadiossRun,
+    find_parts_off,
+    find_time_units,
+    read_run,
+)
 from d2rpick.deck.radioss_sensors import STOPS_SINCE
 from d2rpick.deck.reader import Deck, describe_cure, find_cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
@@ -51,7 +56,7 @@ _ONCE = {
 }
 
 _NOT_REPEATED: Final = {"RFILE"}  # a leg writes its restart file only at the end
-_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
+_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
 
 def write_deck(
@@ -209,24 +214,19 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of a Radioss run with cards."""
     run = read_run(main)
     printed = _read_printed_legs(main, card)
-    if run.starter is None or not run.legs:
-        missing = "starter deck" if run.starter is None else "engine file"
-        raise DeckError(
-            f"{main}: the run has no {missing}, expected a starter deck and an engine file"
-        )
+    starter_deck = _require_starter(main, run)
     leg = run.legs[0]
     _refuse_unlike(run.legs)
-    starter = run.starter.sources[0].name
+    main_source = starter_deck.sources[0]
+    starter = main_source.name
     # The engine looks for a restart file whose name begins with the run name of the engine file.
     root = find_root(starter) or leg.name
     _refuse_other_run(leg, root, printed)
-    _refuse_sensors(run.starter, card)
+    _refuse_sensors(starter_deck, card)
     left_out = {
         body.id: body.node.value for body in find_replaced_bodies(run, card.starter)
     }
-    main_text = insert_cards(
-        run.starter.sources[0], card.starter, read_blocks(run.starter.sources[0])
-    )
+    main_text = insert_cards(main_source, card.starter, read_blocks(main_source))
     main_name = f"{root}_0000.rad"
     yield main_name, _edit_file(starter, main_text, card.sensors, left_out)
     names = {main_name}
@@ -238,8 +238,18 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         engine_text = text + "".join(f"{line}\n" for line in lines)
         repeated_blocks = _read_repeated_blocks(leg, printed_leg)
         yield name, engine_text.encode() + repeated_blocks
-    for name, content in copy_files(run.starter.sources[1:], starter, names):
+    for name, content in copy_files(starter_deck.sources[1:], starter, names):
         yield name, _edit_file(name, content, card.sensors, left_out)
+
+
+def _require_starter(main: str, run: RadiossRun) -> Starter:
+    """Return the starter deck of a run; raise DeckError if it has none, or no engine file."""
+    if run.starter is None or not run.legs:
+        missing = "starter deck" if run.starter is None else "engine file"
+        raise DeckError(
+            f"{main}: the run has no {missing}, expected a starter deck and an engine file"
+        )
+    return run.starter
 
 
 def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
@@ -487,11 +497,7 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     from d2rpick.deck.radioss_bodies import find_bodies  # imported here to start faster
 
     run = read_run(path)
-    if run.starter is None or not run.legs:
-        missing = "starter deck" if run.starter is None else "engine file"
-        raise DeckError(
-            f"{path}: the run has no {missing}, expected a starter deck and an engine file"
-        )
+    starter = _require_starter(path, run)
     leg = run.legs[0]
     chosen = tuple(sorted(parts)) or find_parts_off(run)
     if not chosen:
@@ -502,12 +508,12 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     off_nodes = tuple(
         node for node in find_bodies_kept_off([leg]) if node not in bodies.nodes
     )
-    source = run.starter.sources[0]
+    source = starter.sources[0]
     main = f"{leg.name}_0000.rad"
     content = insert_cards(source, bodies.cards, read_blocks(source))
     files = {
         main: content,
-        **dict(copy_files(run.starter.sources[1:], source.name, {main})),
+        **dict(copy_files(starter.sources[1:], source.name, {main})),
     }
     further = tuple(
         (words, read_block(block))
@@ -554,8 +560,4 @@ def _read_interval(leg: RadiossLeg) -> float:
 
 def _find_second(run: RadiossRun) -> float | None:
     """Return the length of a second in the time unit of the deck [time]; None if the deck names no unit."""
-    assert run.starter
-    rows = next((card.rows for card in run.starter.named("BEGIN")), ())
-    if len(rows) > 3:
-        return _IN_A_SECOND.get(UNITS["Time"].cut(rows[3].text).strip().lower())
-    return None
+    return _IN_A_SECOND.get(find_time_units(run)[-1])

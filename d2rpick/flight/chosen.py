@@ -144,7 +144,7 @@ def find_flight(
     refusal = _explain_why_fed(history, quiet.start, quiet.td)
     if refusal:
         return Flight(refusal=refusal)
-    end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
+    end = quiet.end if quiet.end is not None and quiet.end < history.end else None
     has_energies = (
         history.balance is not None and history.balance.kinetic_and_internal is not None
     )
@@ -254,7 +254,7 @@ def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
 
 def _find_end_of_window(history: History, described: Described) -> float | None:
     """Return the end of the window that an oscillator describes; None if the window lasts to the end of the record."""
-    return described.end if described.end < history.time[-1] else None
+    return described.end if described.end < history.end else None
 
 
 def _detect_load_in_window(history: History, described: Described) -> float:

@@ -79,7 +79,7 @@ class QuietTime(NamedTuple):
 
 def find_quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level; None without any."""
-    start = float(history.time[0])
+    start = history.start
     after_td = int(np.searchsorted(history.time, td, side="right"))
     states = slice(0, after_td)
     rounding = round_off(history)
@@ -89,7 +89,7 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
         and energy_before.size >= FEWEST
         and max(energy_before.max(), -energy_before.min()) <= rounding
     )
-    if fallen and td - start >= SHORTEST * (history.time[-1] - start):
+    if fallen and td - start >= SHORTEST * (history.end - start):
         # nothing has happened since the start
         burst = _find_burst(history, states)
         return QuietTime(start, burst, start, td)
@@ -140,9 +140,7 @@ def find_landing_after(history: History, start: float) -> float | None:
     turns = np.searchsorted(history.turns, time[last_known]) - np.searchsorted(
         history.turns, start
     )
-    long_enough = (turns >= _TURNED) & (
-        time - start >= SHORTEST * (history.time[-1] - history.time[0])
-    )
+    long_enough = (turns >= _TURNED) & (time - start >= SHORTEST * history.duration)
     beyond = np.flatnonzero(long_enough & (energy > 2 * top - bottom))
     if not beyond.size:
         return None
@@ -160,7 +158,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
     so that something still feeds the parts.
     """
-    length = td - float(history.time[0])
+    length = td - history.start
     start = td - length / 4
     middle = td - length / 16
     first, first_of_latest = np.searchsorted(history.time, [start, middle])

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # Smallest margin as a share of the flight. A switch moved the landing by up to 2.5 % of the flight
 # in 36 computed runs (OpenRadioss): by up to 1.1 % for a car-like structure, 2.5 % for a box with a block inside.
 LEAST_MARGIN: Final = 0.03
+# A momentum that changes by less than this share in a flight is rounded: no gravity is seen.
+_ROUNDING: Final = 1e-5
 # A force is searched for in at least this many states.
 _FEWEST: Final = 3
 # A contact grazes the body if its force stays below the share _GRAZING_FORCE of the largest force on the body,
@@ -99,18 +101,17 @@ def estimate_landing_spread(
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
-    [length/time], None if that is unknown.  A surface that does not approach the ground by both grazes it.  None if
-    neither error is known.
+    [length/time], None if that is unknown.  A surface that does not approach the ground by both grazes it: of a body
+    whose centre of mass still rises, rotation alone brings a corner down.  None if neither error is known.
     """
     spread = estimate_spread_of_vibration(history, flight)
     speed = compute_closing_speed(history, flight)
     if place is None or speed is None:
         return spread
     front = speed + (turning or 0.0)
-    if turning is not None and front <= 0:
+    if front <= 0:
         return estimate_grazing_spread(history, flight, place)
-    out_of_place = place / front if front > 0 else float("inf")
-    return out_of_place if spread is None else spread + out_of_place
+    return place / front + (spread or 0.0)
 
 
 def estimate_grazing_spread(
@@ -126,7 +127,7 @@ def estimate_grazing_spread(
     if spread is None or speed is None or np.isinf(spread):
         amplitude = None
     else:
-        amplitude = spread * speed
+        amplitude = spread * abs(speed)
     if place is None and amplitude is None:
         return None
     error = (place or 0.0) + (amplitude or 0.0)
@@ -216,7 +217,8 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
     impulse = impulse - contact.gravity * duration
     momenta, members = evidence
     mass = 1.0 if momenta.velocity else momenta.mass(members)
-    return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * mass * speed)
+    towards = mass * abs(speed)
+    return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * towards)
 
 
 def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
@@ -337,16 +339,14 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
     momenta, members = momentum_of_body
     inside = find_window(momenta.time, *flight.within(momenta.time))
     momentum = momenta.of(members)[inside]
-    if len(momentum) < 2:
-        return None
-    change = momentum[-1] - momentum[0]
-    along = change if change.any() else momentum[-1]
-    size = float(np.linalg.norm(along))
-    return np.asarray(along / size) if size > 0 else None
+    return _find_direction_of_change(momentum) if len(momentum) > 1 else None
 
 
 def compute_closing_speed(history: History, flight: Flight) -> float | None:
-    """Return the speed along gravity at the end of a flight, or the total speed without gravity; else None."""
+    """Return the speed along gravity at the end of a flight, negative for a body that rises [length/time].
+
+    Without gravity it is the whole speed.  None if the momentum or the mass is unknown.
+    """
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -357,15 +357,26 @@ def compute_closing_speed(history: History, flight: Flight) -> float | None:
     mass = 1.0 if momenta.velocity else momenta.mass(members)
     if len(momentum) < 2 or not mass > 0:
         return None
-    size = float(np.linalg.norm(momentum[-1])) / mass
-    return size * float(np.sqrt(_compute_share_towards_ground(momentum)))
+    direction = find_direction_of_approach(history, flight)
+    return 0.0 if direction is None else float(momentum[-1] @ direction) / mass
 
 
 def _compute_share_towards_ground(momentum: Samples) -> float:
     """Return the share of the final kinetic energy that belongs to motion along gravity [-]."""
-    last = momentum[-1]
+    direction = _find_direction_of_change(momentum)
+    if direction is None or not momentum[-1].any():
+        return 0.0 if momentum.any() else 1.0
+    return float(momentum[-1] @ direction) ** 2 / float(momentum[-1] @ momentum[-1])
+
+
+def _find_direction_of_change(momentum: Samples) -> Samples | None:
+    """Return the unit vector along which a momentum (n, 3 or 1) changes, or its own if only rounding changes it.
+
+    None if the momentum is 0.
+    """
     change = momentum[-1] - momentum[0]
-    if not change.any():
-        return 1.0
-    along = float(last @ change) ** 2
-    return along / float((change @ change) * (last @ last)) if last.any() else 0.0
+    largest = float(np.linalg.norm(momentum, axis=1).max())
+    size = float(np.linalg.norm(change))
+    along = change if size > _ROUNDING * largest else momentum[-1]
+    length = float(np.linalg.norm(along))
+    return np.asarray(along / length) if length > 0 else None

@@ -2,8 +2,8 @@
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
-relative displacement from tr to td, in the frame that turns with the body ("Out of place" in docs).  Displacements come
-from the velocities of the parts, their momenta over their masses.
+relative displacement from tr to td, in the frame that turns with the body (docs/explanation/position-error.md).
+Displacements come from the velocities of the parts, their momenta over their masses.
 
 Each of several rigid bodies has its own error, and the largest counts.  A body of a single part moves as the part does:
 its momentum is kept, and nothing in it is frozen elsewhere.
@@ -192,7 +192,7 @@ def find_drift(
     mass = masses[members]
     if not has_clear_rotation(mass):
         return None
-    ways, path = _integrate_displacements(
+    ways, path = integrate_displacements(
         time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
     )
     stride = -(-time.size // _STATES)
@@ -225,7 +225,7 @@ def find_drift(
     return drift if turning or doubt <= drift.limit else None
 
 
-def _integrate_displacements(
+def integrate_displacements(
     time: Samples, velocity: Samples, mass: Samples
 ) -> tuple[Samples, Samples]:
     """Return the displacements of parts (n, parts, 3) from their centre of mass, and its path (n,) [length]."""

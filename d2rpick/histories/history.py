@@ -346,6 +346,21 @@ class History:
         """Energies of the whole model, as far as the files contain them."""
         return self.evidence.balance
 
+    @property
+    def start(self) -> float:
+        """Time of the first state [time]."""
+        return float(self.time[0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last state [time]."""
+        return float(self.time[-1])
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last state [time]."""
+        return float(self.time[-1] - self.time[0])
+
     @cached_property
     def step(self) -> float:
         """Largest output interval [time], which limits the vibration that the record resolves."""

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories import force_listings
 from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import OpenedRun
-from d2rpick.histories.source import Source, open_files
+from d2rpick.histories.source import Source, list_tables_of_folder, open_files
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,6 +43,8 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # upper limit for the length of the legend of an ASCII database [bytes]
 _LONGEST_LEGEND: Final = 1 << 24
+# largest number of unused tables that a note names
+_MOST_TABLES: Final = 3
 # characters at the end of the name of a later file of a family
 _DIGITS: Final = "0123456789"
 
@@ -91,15 +93,33 @@ def open_run(
         If a file cannot be read as an energy history, if companions have no time in common, or if one of several files
         was replaced while they were opened.
     """
-    return open_sources(open_files(names), selection, input_format)
+    notes = _note_unused_tables(names)
+    return open_sources(open_files(names), selection, input_format, notes)
+
+
+def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note on the tables of energies in the folders of ``names``, where only databases of solvers are read."""
+    tables = [table for name in names for table in list_tables_of_folder(name)]
+    if not tables:
+        return ()
+    listed = list_names(tables, most=_MOST_TABLES)
+    if len(tables) == 1:
+        return (_note_left_out_table(listed),)
+    return (
+        f"{listed} were left out: tables next to databases of the solver; name one to use it",
+    )
 
 
 def open_sources(
     sources: Sequence[Source],
     selection: Selection = _DEFAULT,
     input_format: str = "auto",
+    notes_on_names: tuple[str, ...] = (),
 ) -> OpenedRun:
-    """Open the files of one run from their bytes; arguments and errors as in `open_run`."""
+    """Open the files of one run from their bytes; arguments and errors as in `open_run`.
+
+    ``notes_on_names`` are about the names by which the files were found.
+    """
     with_forces = []
     if input_format == "auto":
         with_forces = [source for source in sources if _is_force_listing(source)]
@@ -139,9 +159,14 @@ def open_sources(
     files = tuple(source for source in (*sources, *with_forces) if source.name in used)
     # the first file of a family stands for all its files
     names = tuple(source.name for source in files if source.name not in later_files)
-    reopen = partial(_reopen, files, selection, input_format)
+    reopen = partial(_reopen, files, selection, input_format, notes_on_names)
     return OpenedRun(
-        names, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen
+        names,
+        databases,
+        files,
+        notes=(*notes_on_names, *notes, *unread),
+        forces=forces,
+        reopen=reopen,
     )
 
 
@@ -149,10 +174,12 @@ def _reopen(
     sources: Sequence[Source],
     selection: Selection,
     input_format: str,
+    notes_on_names: tuple[str, ...],
     surroundings: Surroundings,
 ) -> OpenedRun:
     """Open a run again with other external forces (``surroundings``)."""
-    return open_sources(sources, selection, input_format).within(surroundings)
+    run = open_sources(sources, selection, input_format, notes_on_names)
+    return run.within(surroundings)
 
 
 def _sort_by_format(
@@ -193,14 +220,16 @@ def _sort_by_format(
     notes = [_note_left_out_file(source, str(error)) for source, error in foreign]
     if input_format == "auto" and any(READERS[kind].solver for kind in kinds):
         tables = [source for source in kinds.get("csv", []) if source.by_pattern]
-        notes += [
-            f"{source.name} was left out: a table next to databases of the solver; name it to use it"
-            for source in tables
-        ]
+        notes += [_note_left_out_table(source.name) for source in tables]
         named_tables = [s for s in kinds.pop("csv", []) if s not in tables]
         if named_tables:
             kinds["csv"] = named_tables
     return kinds, notes
+
+
+def _note_left_out_table(name: str) -> str:
+    """Return the note on a table that was left out."""
+    return f"{name} was left out: a table next to databases of the solver; name it to use it"
 
 
 def _note_left_out_file(source: Source, refusal: str) -> str:

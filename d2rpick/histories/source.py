@@ -30,6 +30,9 @@ _BLOCK = 1 << 16  # number of packed bytes unpacked at a time; they become at mo
 # Smallest similarity of a suggested file name. It is high because the same suffix makes names similar.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
+# A table whose first bytes contain this word is probably an energy history.
+_ENERGY_IN_HEAD: Final = b"energy"
+_HEAD_OF_TABLE: Final = 4096
 
 # A name and the number of the leg after it: runT01, binout0001, glstat02; the first leg may have no number.
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
@@ -220,6 +223,28 @@ def _list_databases(folder: Path) -> list[str]:
         problem = f"{folder}: this folder holds several runs ({list_names(runs, most=5)}), one was expected"
         raise FormatError(f"{problem}; name the files of one")
     return [str(file) for file in databases]
+
+
+def list_tables_of_folder(name: str) -> list[str]:
+    """Return the CSV files with energies in a folder, which is read without them; empty if ``name`` is no folder."""
+    if name == STDIN or not os.path.isdir(name):  # noqa: PTH112  starts faster
+        return []
+    from pathlib import Path
+
+    return [
+        str(file)
+        for file in sorted(Path(name).glob("*.csv"))
+        if file.is_file() and _ENERGY_IN_HEAD in _read_head(file).lower()
+    ]
+
+
+def _read_head(file: Path) -> bytes:
+    """Return the beginning of a file; nothing if it cannot be read."""
+    try:
+        with file.open("rb") as opened:
+            return opened.read(_HEAD_OF_TABLE)
+    except OSError:
+        return b""
 
 
 def _find_run(file: Path) -> str:

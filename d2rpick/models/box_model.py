@@ -2,8 +2,8 @@
 
 The box is the cross-section of a thin-walled body in its plane of roll: an outer and an inner ring of mass points,
 connected by bars along both rings, across, and diagonally. So its walls bend, the frame racks, and it has twice as
-many modes as points. The step is a small truss at the foot of the leading side; only the step meets the curb, and it
-is never switched. Vectors of the plane are complex numbers, x + i z: x forward, z up. SI units.
+many modes as points. The step is a small truss at the foot of the leading side; only the step meets the curb. Vectors
+of the plane are complex numbers, x + i z: x forward, z up. SI units.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at small speeds. The
 cushion of the curb crushes like honeycomb: at a constant force, irreversibly, until its depth is used up. In a drop
-there is only the ground. While it is switched the box moves as one body, with three equations in the plane.
+there is only the ground. While it is switched the box, alone or with its step, moves as one body, with three equations
+in the plane.
 """
 
 from __future__ import annotations
@@ -265,7 +266,8 @@ class BoxMotion:
     """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
     A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
-    the box while it is rigid, else None.
+    the rigid body while there is one, else None; it contains the points of the box, and those of the step if the step
+    is rigid too.
     """
 
     def __init__(self, parameters: Parameters, interval: float) -> None:
@@ -289,6 +291,8 @@ class BoxMotion:
         self.box, self.step = Bars(s.box, s.places.size), Bars(s.step, s.places.size)
         self.contact = Contact(s, parameters)
         self.body: RigidPoints | None = None
+        self._rigid_points = slice(0)
+        self._deformable_bars: tuple[Bars, ...] = (self.step, self.box)
         self.accounts = Accounts()
         self.count = 0
 
@@ -305,42 +309,49 @@ class BoxMotion:
         """Return an independent copy that can be continued."""
         return copy.deepcopy(self)
 
-    def make_rigid(self) -> None:
-        """Make the box rigid: it keeps its momenta, its vibration stops, and its deformation is frozen."""
+    def make_rigid(self, *, with_step: bool = False) -> None:
+        """Make the box rigid, alone or together with the step.
+
+        The rigid points keep their momenta, their vibration stops, and their deformation is frozen.
+        """
+        frozen_bars = (self.box, self.step) if with_step else (self.box,)
+        self._deformable_bars = () if with_step else (self.step,)
         # The forces are evaluated once more, so that bars yield before they are frozen.
-        self.box.forces(self.places)
-        of_box = slice(self.structure.of_box)
-        masses = self.structure.masses[of_box]
-        deformable = self.velocities[of_box]
-        self.body = RigidPoints(masses, self.places[of_box], deformable)
+        for bars in frozen_bars:
+            bars.forces(self.places)
+        s = self.structure
+        points = slice(s.places.size if with_step else s.of_box)
+        self._rigid_points = points
+        masses = s.masses[points]
+        deformable = self.velocities[points]
+        self.body = RigidPoints(masses, self.places[points], deformable)
         rigid = self.body.velocities
         self.accounts.lost += (
             float(masses @ (np.abs(deformable) ** 2 - np.abs(rigid) ** 2)) / 2
         )
-        self.velocities = np.concatenate(
-            [rigid, self.velocities[self.structure.of_box :]]
-        )
+        self.velocities = np.concatenate([rigid, self.velocities[points.stop :]])
 
     def make_deformable(self) -> None:
-        """Make the box deformable again: the points keep the body's velocities, and the bars keep their lengths."""
+        """Make all parts deformable again: points keep the body's velocities, and bars keep their lengths."""
         self.body = None
+        self._deformable_bars = (self.step, self.box)
 
     def advance(self) -> Plane:
         """Advance the velocities to half a step after the positions; return their mean over the step, (n,) [m/s]."""
-        s = self.structure
         old_velocities = self.velocities
         push = self.contact.push(self.time, self.places, old_velocities)
         outer = self._weight + push.forces if push else self._weight
-        forces = outer + self.step.forces(self.places)
-        if not self.body:
-            forces += self.box.forces(self.places)
+        forces = outer
+        for bars in self._deformable_bars:
+            forces = forces + bars.forces(self.places)
         half = self.damping * self.dt / 2
         new_velocities = ((1 - half) * old_velocities + self._mobility * forces) / (
             1 + half
         )
         if self.body:
-            self.body.push(forces[: s.of_box], self.damping, self.dt)
-            new_velocities[: s.of_box] = self.body.velocities
+            points = self._rigid_points
+            self.body.push(forces[points], self.damping, self.dt)
+            new_velocities[points] = self.body.velocities
         mean: Plane = np.multiply(0.5, old_velocities + new_velocities)
         self._account(mean, outer, push)
         self.velocities = new_velocities
@@ -350,10 +361,10 @@ class BoxMotion:
         """Move the points by a time step."""
         self.places = self.places + self.dt * self.velocities
         if self.body:
-            of_box = slice(self.structure.of_box)
+            points = self._rigid_points
             self.body.move(self.dt)
-            self.places[of_box] = self.body.places
-            self.velocities[of_box] = self.body.velocities
+            self.places[points] = self.body.places
+            self.velocities[points] = self.body.velocities
         self.count += 1
 
     def _account(self, mean: Plane, outer: Plane, push: Push | None) -> None:

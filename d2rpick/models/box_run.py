@@ -227,10 +227,14 @@ def _count_updates(motion: BoxMotion) -> int:
 
 @dataclass(frozen=True)
 class RigidWindow:
-    """The interval from ``tr`` to ``td`` [s] in which the box is rigid; raise RangeError unless 0 <= tr <= td."""
+    """The interval from ``tr`` to ``td`` [s] in which the box is rigid, alone or ``with_step`` as one body.
+
+    Raises RangeError unless 0 <= tr <= td.
+    """
 
     tr: float
     td: float
+    with_step: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.tr <= self.td:
@@ -277,14 +281,14 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     Raises RangeError if its numbers become infinite.
     """
     last = motion.every * (motion.step_at(t_end) // motion.every)
-    rigid = {motion.step_at(window.tr) for window in windows}
+    rigid = {motion.step_at(window.tr): window for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
     # No warnings, because the recorder raises an error for infinite numbers.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
             if motion.count in rigid:
-                motion.make_rigid()
+                motion.make_rigid(with_step=rigid[motion.count].with_step)
             if motion.count in deformable:
                 motion.make_deformable()
             mean = motion.advance()

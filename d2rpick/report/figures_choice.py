@@ -281,7 +281,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     """Draw the energy over time on shaded flights, with the rigid windows below the curve."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
-    span = float(history.time[-1] - history.time[0])
+    span = history.duration
     axes.plot(
         history.time,
         history.energy,
@@ -483,7 +483,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
     units = {row.time_unit for row in answer.runs if row.judged}
     axes.set(
         xlabel=add_unit("time", units.pop() if len(units) == 1 else ""),
-        ylabel="internal energy",
+        ylabel=label_energy(answer.energy_unit),
     )
     figures.format_axes(axes, legend=False)
     _show_runs(axes, answer, runs, [*drawn.values()])

@@ -125,7 +125,7 @@ def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
 
 
 def as_csv(checks: Checks, _: DisplayOptions) -> str:
-    """Return CSV with one row per verdict and per finding, and a column for each key of ``findings`` in the JSON output.
+    """Return CSV with a row per verdict and per finding, and a column for each key of ``findings`` in the JSON output.
 
     The row of a verdict has no rule.
     """

@@ -27,7 +27,7 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "calibration": (*PLAIN, "toml"),
     "drive": ("table", "json"),
     "verdict": PLAIN,
-    "overview": PLAIN,
+    "overview": (*PLAIN, "ndjson"),
     "study": (*PLAIN, "ndjson"),
     "rollover": PLAIN,
     "findings": (*PLAIN, "ndjson", "github", "junit", "sarif"),

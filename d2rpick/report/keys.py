@@ -53,10 +53,11 @@ HISTORY: Final = row(
     Field("channel", "text", "channel that is used as internal energy"),
     Field("parts", maybe(many(PART)), "parts whose energies were added; null for the whole model, or for columns"),
     Field("states", get_kind("integer", minimum=3), get=lambda history: int(history.time.size)),
-    Field("time_start", "number", get=lambda history: float(history.time[0])),
-    Field("time_end", "number", get=lambda history: float(history.time[-1])),
+    Field("time_start", "number", get=lambda history: history.start),
+    Field("time_end", "number", get=lambda history: history.end),
     Field("complete", "flag", "false if the file ends within a state"),
     Field("notes", "texts"),
+    Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
     name="history",
 )  # fmt: skip
 _SOURCE: Final = one_of(

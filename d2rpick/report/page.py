@@ -388,16 +388,20 @@ def build_verdict_card(
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
     """Return the card of a verdict: ``title``, the verdict as a badge, the times in large type, and the reason."""
-    kind = CLASSES[decision.verdict]
-    badge = make_element("span", decision.verdict, class_=f"badge {kind}")
     _, *why = list_verdict_lines(decision, *times)
     return build_pair_card(
-        join([title, badge]),
+        join([title, build_badge(decision)]),
         times,
         build_pairs([*why, *facts]),
         history,
-        f"card {kind}",
+        f"card {CLASSES[decision.verdict]}",
     )
+
+
+def build_badge(decision: Decision) -> Markup:
+    """Return the verdict in a frame of its colour."""
+    class_ = f"badge {CLASSES[decision.verdict]}"
+    return make_element("span", decision.verdict, class_=class_)
 
 
 def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:

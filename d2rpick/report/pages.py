@@ -18,7 +18,11 @@ from d2rpick.report import (
     trade_off,
     verdict,
 )
-from d2rpick.report.decision import format_rigid_time, list_statements
+from d2rpick.report.decision import (
+    format_rigid_time,
+    list_statements,
+    list_verdict_lines,
+)
 from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
 from d2rpick.report.page import (
     Explorer,
@@ -29,6 +33,7 @@ from d2rpick.report.page import (
     build_remarks,
     build_scrolling_table,
     build_section,
+    join,
     make_element,
 )
 from d2rpick.report.situation import describe_input
@@ -492,13 +497,21 @@ def _build_set_card(best: PartSet | None) -> Markup:
         f"{best.saving:.0%}",
         make_element("i", " of the CPU time"),
     )
-    listed = make_element("p", f"parts {parts.format_part_ranges(best.parts)}")
+    name = f"Parts {parts.format_part_ranges(best.parts)}: {parts.name_set(best)}"
+    decision = best.decision
+    if decision is None or best.window is None:
+        why = Markup()
+        title, class_ = name, "card chosen"
+    else:
+        why = build_pairs(list_verdict_lines(decision, *best.window))
+        title = join([name, page.build_badge(decision)])
+        class_ = f"card {page.CLASSES[decision.verdict]}"
     return make_element(
         "div",
-        make_element("h2", parts.name_set(best)),
+        make_element("h2", title),
         make_element("div", saved, class_="times"),
-        listed,
-        class_="card chosen",
+        why,
+        class_=class_,
     )
 
 
@@ -576,6 +589,7 @@ _LOOKS: Final[
     "plan": (
         lambda answer: [
             ("", plan.give_plan_sentence(answer)),
+            *plan.list_verdicts(answer),
             *plan.list_plan_remarks(answer),
         ],
         plan.build_flight_table,
@@ -586,7 +600,10 @@ _LOOKS: Final[
             answer, next(iter(parts.TABLES.values()))
         ),
     ),
-    "study": (study.list_outcome, study.build_run_table),
+    "study": (
+        lambda answer: [*study.list_outcome(answer), *study.list_run_reasons(answer)],
+        study.build_run_table,
+    ),
 }
 
 

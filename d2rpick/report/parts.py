@@ -6,8 +6,9 @@ from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import format_ranges, list_names, make_printable
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import format_saved_share
+from d2rpick.report.decision import format_saved_share, list_verdict_lines
 from d2rpick.report.fields import (
     Document,
     Field,
@@ -30,13 +31,13 @@ if TYPE_CHECKING:
 SETS = (
     "set",
     "parts",
-    "saved per step",
     "tr",
     "td",
-    "CPU time",
-    "saves",
-    "out of place",
-    "rotated [deg]",
+    "CPU time saved",
+    "saved while rigid",
+    "position error",
+    "rotation error [deg]",
+    "verdict",
 )
 TABLES = {
     "Parts": (
@@ -45,8 +46,8 @@ TABLES = {
         "make rigid?",
         "flies",
         "deforms",
-        "energy",
-        "scatter",
+        "mean energy",
+        "energy scatter",
         "why",
     ),
     "Elements": (
@@ -56,8 +57,8 @@ TABLES = {
         "formulation",
         "material",
         "mass",
-        "cost",
-        "step",
+        "share of CPU time",
+        "time step",
         "shares nodes with",
     ),
 }
@@ -152,7 +153,14 @@ _FLIGHT: Final = row(
 )
 _MOST_SHOWN = 6
 # Columns that are omitted, in this order, if a terminal is too narrow.
-_SPARE: Final = ("material", "step", "mass", "saved per step", "rotated [deg]")
+_SPARE: Final = (
+    "material",
+    "saved while rigid",
+    "time step",
+    "mass",
+    "rotation error [deg]",
+    "energy scatter",
+)
 # Displayed verdicts on parts.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
 # Displayed names of the sets.
@@ -199,6 +207,7 @@ SET: Final = row(
           "rotation error of the body at td [degrees]; null if unknown"),
     Field("reasons", "texts"),
     keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
+    *(field for field in keys.DECISION if field.key in ("verdict", "verdict_reason", "cure")),
 )  # fmt: skip
 
 
@@ -379,8 +388,8 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     share = best.run_time_share
     saves = "unknown" if share is None else f"{format_saved_share(share)}{where}"
     return [
-        (
-            "make rigid",
+        *_list_verdict_of_set(
+            best,
             f"--part {format_part_ranges(best.parts)}, {name_set(best)} ({bodies})",
         ),
         ("saves", saves),
@@ -389,6 +398,17 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
             f"d2rpick plan --part {format_part_ranges(best.parts)} with the same files",
         ),
     ]
+
+
+def _list_verdict_of_set(best: PartSet, name: str) -> list[tuple[str, str]]:
+    """Return the verdict on the recommended set and its window, with reason and cure."""
+    decision = best.decision
+    if decision is None or best.window is None:
+        return [("make rigid", name)]
+    tr, td = best.window
+    verdict, *why_and_cure = list_verdict_lines(decision, tr, td)[:-1]
+    action = "best set" if decision.verdict == DO_NOT_USE else "make rigid"
+    return [(verdict[0], f"{action} {name}; {verdict[1]}"), *why_and_cure]
 
 
 def name_set(part_set: PartSet) -> str:
@@ -400,6 +420,10 @@ def list_remarks(answer: Parts) -> list[tuple[str, str]]:
     """Return remarks on the recommended set, and why other sets are not compared, as (name, sentence) pairs."""
     lines: list[tuple[str, str]] = []
     best = answer.recommended
+    if best:
+        lines.append(
+            ("*", "the recommended set and its parts (d2rpick plan --part recommended)")
+        )
     if best and best.step_growth is not None and best.step_growth > 1:
         if isinf(best.step_growth):
             much = "without limit"
@@ -460,12 +484,14 @@ COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "formulation": lambda row: ", ".join(row.formulations) or None,
     "material": lambda row: row.material,
     "mass": lambda row: _format_short(row.mass),
-    "energy": lambda row: _format_short(row.flight.mean if row.flight else None),
-    "scatter": lambda row: _format_percent(row.flight.scatter if row.flight else None),
+    "mean energy": lambda row: _format_short(row.flight.mean if row.flight else None),
+    "energy scatter": lambda row: _format_percent(
+        row.flight.scatter if row.flight else None
+    ),
     "flies": lambda row: row.flight.flies if row.flight else None,
     "deforms": lambda row: row.flight.deforms if row.flight else None,
-    "cost": lambda row: _format_percent(row.cost_share),
-    "step": lambda row: _format_short(row.smallest_step),
+    "share of CPU time": lambda row: _format_percent(row.cost_share),
+    "time step": lambda row: _format_short(row.smallest_step),
     "shares nodes with": _format_sharing_parts,
     "why": lambda row: "; ".join(row.reasons),
 }
@@ -474,18 +500,19 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "parts": lambda part_set: format_part_ranges(part_set.parts),
     "elements": lambda part_set: part_set.elements,
     "mass": lambda part_set: _format_percent(part_set.mass_fraction),
-    "saved per step": lambda part_set: _format_percent(part_set.cost_share),
-    "step grows": lambda part_set: (
+    "saved while rigid": lambda part_set: _format_percent(part_set.cost_share),
+    "time step grows": lambda part_set: (
         "free"
         if is_limited_by_no_part(part_set)
         else tables.format_if_known(part_set.step_growth, ".2g")
     ),
     "tr": lambda part_set: part_set.window[0] if part_set.window else None,
     "td": lambda part_set: part_set.window[1] if part_set.window else None,
-    "CPU time": lambda part_set: _format_percent(part_set.run_time_share),
-    "saves": lambda part_set: _format_percent(part_set.saving),
-    "out of place": _format_position_error,
-    "rotated [deg]": lambda part_set: _format_lower_bound(
+    "CPU time left": lambda part_set: _format_percent(part_set.run_time_share),
+    "CPU time saved": lambda part_set: _format_percent(part_set.saving),
+    "position error": _format_position_error,
+    "rotation error [deg]": lambda part_set: _format_lower_bound(
         part_set, part_set.angle_error
     ),
+    "verdict": lambda part_set: part_set.decision and part_set.decision.verdict,
 }

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions
 
 
-# For each status of a window, when the window can be used.
-_WHEN: Final = {
-    "supported": "now",
-    "re-plan": "after a rerun",
+# For each status of a window, in which run the parts can be switched in it.
+_RUN: Final = {
+    "supported": "next run",
+    "re-plan": "later run",
     "done": "done",
-    "left-out": "not planned",
+    "left-out": "no run",
 }
 
 _BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
@@ -186,6 +186,11 @@ DOCUMENT: Final = Document(
             "run_time_share",
             "number?",
             "CPU time relative to the reference run, with all supported windows; null if the cost is unknown",
+        ),
+        Field(
+            "fewest_cycles",
+            "integer?",
+            "fewest time steps of the written run, if one largest step holds throughout, as with sensors; else null",
         ),
     ),
 )
@@ -423,5 +428,5 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "error": format_pair_error,
     _OUT_OF_PLACE: _format_place_error,
     "verdict": lambda row: row.decision.verdict if row.decision else None,
-    "when": lambda row: _WHEN[row.status],
+    "switch in": lambda row: _RUN[row.status],
 }

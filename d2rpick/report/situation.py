@@ -26,7 +26,7 @@ def describe_input(history: History) -> str:
     description = (
         f"{', '.join(history.source)}: {history.format}, {name_energy(history)}"
     )
-    span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
+    span = f"{history.start:.6g} to {history.end:.6g}{unit}"
     return make_printable(f"{description}, {history.time.size} states, {span}")
 
 

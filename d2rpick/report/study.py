@@ -12,6 +12,7 @@ from d2rpick.choice.runs.study import (
     StudyOfRuns,
     StudyRow,
     find_cut_runs,
+    find_repeated_runs,
     format_number_of_runs,
 )
 from d2rpick.histories.digits import format_window
@@ -64,6 +65,7 @@ PLAIN: Final = row(
     Field("verdict", maybe(keys.VERDICT), "what to do with the pair of this run", later=True),
     Field("verdict_reason", "text?", "reason for the verdict, as text", later=True),
     Field("cure", "text?", "how to improve the pair; empty for a good pair", later=True),
+    Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -122,8 +124,8 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Columns that are omitted, in this order, if a terminal is too narrow.
-_SPARE: Final = ("E(td)", "+-", "basis", "error at common tr")
+# Columns that are omitted, in this order, if a terminal is too narrow; the first of all is the energy at td.
+_SPARE: Final = ("+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
     LAST.name,
@@ -146,7 +148,13 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
         [*list_outcome(answer), *list_run_reasons(answer)]
     )
     return "\n".join(
-        [*outcome_lines, "", tables.as_text(head, rows, display.width, _SPARE)]
+        [
+            *outcome_lines,
+            "",
+            tables.as_text(
+                head, rows, display.width, (name_target_energy(answer), *_SPARE)
+            ),
+        ]
     )
 
 
@@ -189,7 +197,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
             run_and_error[0].tr_low, run_and_error[0].tr_high
         ),
         "td": lambda run_and_error: run_and_error[0].td,
-        "E(td)": lambda run_and_error: run_and_error[0].energy_td,
+        name_target_energy(answer): lambda run_and_error: run_and_error[0].energy_td,
         "residual": lambda run_and_error: tables.format_measure(
             run_and_error[0].residual
         ),
@@ -209,6 +217,11 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
         ),
     }
     return tables.fill_table(columns, add_errors(answer))
+
+
+def name_target_energy(answer: StudyOfRuns) -> str:
+    """Return the head of the column of the energies at td, with their unit if all runs name it."""
+    return f"E(td) [{answer.energy_unit}]" if answer.energy_unit else "E(td)"
 
 
 def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
@@ -234,6 +247,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
     return [
         (heading, shared),
         ("each run", _count_verdicts(answer)),
+        *_list_repetitions(answer),
         ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
@@ -244,6 +258,20 @@ def _format_error_span(errors: Sequence[float]) -> str:
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
+
+
+def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
+    """Return how many runs have the same content as another run; nothing if all runs differ."""
+    count = sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
+    if not count:
+        return []
+    have = "has" if count == 1 else "have"
+    return [
+        (
+            "repeated",
+            f"{format_number_of_runs(count)} {have} the same content as another run",
+        )
+    ]
 
 
 def _count_verdicts(answer: StudyOfRuns) -> str:

@@ -119,9 +119,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
                 *_select_shown_candidates(answer, display), display.width, _SPARE
             ),
         ]
+        lines += tables.format_in_line(list_candidate_reasons(answer, listed))
         hidden_count = len(answer.candidates) - display.limit
         lines += [f"... and {hidden_count} more (--limit)"] * (hidden_count > 0)
-        lines += tables.format_in_line(list_candidate_reasons(answer, listed))
     return "\n".join(lines)
 
 
@@ -145,9 +145,7 @@ def _select_shown_candidates(
     shown_columns = [
         i for i, name in enumerate(head) if display.verbose or name not in _IN_FULL
     ]
-    return [head[i] for i in shown_columns], [
-        [row[i] for i in shown_columns] for row in rows
-    ]
+    return tables.select_columns(head, rows, shown_columns)
 
 
 def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:

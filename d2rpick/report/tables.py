@@ -79,9 +79,15 @@ def select_known_columns(
         for i in range(len(head))
         if any(row[i] not in (None, "", "-") for row in rows)
     ]
-    return [head[i] for i in known_columns], [
-        [row[i] for i in known_columns] for row in rows
-    ]
+    return select_columns(head, rows, known_columns)
+
+
+def select_columns(
+    head: Sequence[str], rows: Sequence[Sequence[Cell]], columns: Sequence[int]
+) -> tuple[list[str], list[list[Cell]]]:
+    """Return the columns with these indices of a table."""
+    selected_rows = [[row[i] for i in columns] for row in rows]
+    return [head[i] for i in columns], selected_rows
 
 
 def fill_table(

@@ -87,6 +87,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
         *tables.format_in_line(list_answer_lines(trade_off)),
         "",
         offered,
+        *tables.format_in_line(list_offer_reasons(listed_offers)),
     ]
     hidden_count = len(trade_off.offers) - len(listed_offers)
     if hidden_count:
@@ -95,7 +96,6 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
         ("history", describe_input(trade_off.situation.history)),
         ("td", window),
     ]
-    lines += tables.format_in_line(list_offer_reasons(listed_offers))
     return "\n".join([*lines, "", *tables.format_in_line(input_lines)])
 
 

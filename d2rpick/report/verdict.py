@@ -130,9 +130,11 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     """Return the known measures of the pair with their displayed names."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
+    unit = answer.situation.history.energy_unit
+    unit_text = f" [{make_printable(unit)}]" if unit else ""
     rows: list[tuple[str, tables.Cell]] = [
-        ("energy at tr", best.energy),
-        ("energy at td", answer.energy_td),
+        (f"energy at tr{unit_text}", best.energy),
+        (f"energy at td{unit_text}", answer.energy_td),
         ("energy at tr / at td", best.level_ratio),
         ("level error", tables.format_if_known(best.level_error, ".3f")),
         ("direction of the deformation at tr", direction),

@@ -120,8 +120,8 @@ def make_view(
 
     If no flight is known, the view is the whole record.
     """
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     if flight.start is None:
         inner = first, last
     else:

@@ -249,9 +249,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
-            "Most parts of the deck have other titles than the parts of the history, so d2rpick does not use the "
-            "deck.",
-            "Give the deck of this run.",
+            "Most parts of the deck have other titles than the parts of the history, or the deck lacks parts of the "
+            "history, so d2rpick does not use it. The exit code is 1 if you gave the deck with --deck.",
+            "Give the deck of this run, or leave out --deck.",
         ),
         "judged-by-whole": Explanation(
             "The history does not contain these parts, or the members of a part set or rigid body are unknown. "
@@ -362,6 +362,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "cut-runs": Explanation(
             "Some runs end within a state, or earlier than the other runs. Their tr is based on less data.",
             "Check whether these runs failed. Let them finish, or leave them out.",
+        ),
+        "repeated-runs": Explanation(
+            "Several runs of the study have the same content, so that they agree by necessity. The common tr rests on "
+            "fewer runs than the table has rows.",
+            "Give each run once. Check whether a file was copied to the wrong folder.",
         ),
         "internal-error": Explanation(
             "An error in d2rpick occurred for this input. d2rpick judged the other inputs.",

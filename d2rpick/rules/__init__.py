@@ -27,7 +27,7 @@ from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
 from d2rpick.rules.rule import Rule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.deck.card import CardField

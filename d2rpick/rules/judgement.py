@@ -111,7 +111,7 @@ class HistoryJudge:
     @property
     def end(self) -> float:
         """Return the last time of the history."""
-        return float(self._reference(self._known[:1]).history.time[-1])
+        return self._reference(self._known[:1]).history.end
 
     @property
     def cautions(self) -> list[Caution]:
@@ -259,8 +259,8 @@ def _find_times_outside(
     history: History, tr: float, td: float | None
 ) -> Iterator[Fault]:
     """Yield objections to times outside the history, and to a td that seems to have another unit."""
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     named_times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
     is_inside = True
     for name, time in named_times:
@@ -314,7 +314,7 @@ def _judge_open_window(
     """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
     tr.
     """
-    last = examine_td(history, float(history.time[-1]), settings)
+    last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
         return

@@ -421,13 +421,13 @@ def _check_times_of_history(case: Case) -> Iterator[Objection]:
     _make_pair_deck("0.0135", ".0687534", "--tolerance 0.05"),
 )
 @make_rule_decorator(
-    "D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH
+    "D2R201", ERROR, "the error of the frozen deformation is above --tolerance", BOTH
 )
 def _check_locked_in_error(case: Case) -> Iterator[Objection]:
     """While a part is rigid, it keeps the deformation that it had at tr, and it springs back at td. This deformation
     should equal the deformation in the reference run at td: same energy, same direction. d2rpick judges the parts that
-    share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the lock-in
-    error if an oscillator describes the history, otherwise the level error.
+    share a window together, as d2rpick verify does, or the whole model if the history has no parts. It uses the
+    frozen-deformation error if a vibration model describes the history, otherwise the level error.
 
     Fix: Replace tr, or both times, by the times in the finding, or by those of d2rpick suggest.
     """
@@ -459,7 +459,8 @@ def _check_sign(case: Case) -> Iterator[Objection]:
 )
 def _check_kinetic_share(case: Case) -> Iterator[Objection]:
     """A rigid part does not vibrate, so the kinetic fraction of the vibration energy at td is lost, whatever tr is.
-    Near a maximum of the internal energy hardly any vibration energy is kinetic. Not reported if D2R209 is.
+    Near a maximum of the internal energy hardly any vibration energy is kinetic. If D2R209 reports the pair, this rule
+    does not.
 
     Fix: Replace both times by the pair in the finding, or choose a td near a maximum of the internal energy.
     """

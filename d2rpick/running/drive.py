@@ -19,7 +19,6 @@ from d2rpick.base.files import (
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     Leg,
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.engine import Commands, Solver
+    from d2rpick.running.inner_motion import Wait
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
@@ -308,7 +308,7 @@ class Observer:
         )
         self._looks = Looks(selection, inventory)
         self._waits = (wait, of_deck)
-        self._evidence, self._motion = GrowingEvidence(), InnerMotion(*self._waits)
+        self._evidence = GrowingEvidence(*self._waits)
 
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
@@ -321,11 +321,9 @@ class Observer:
         names = [str(path) for path in histories]
         states, follows = self._looks.new_states(names)
         if not follows:
-            self._evidence = GrowingEvidence()
-            self._motion = InnerMotion(*self._waits, wait_before)
+            self._evidence = GrowingEvidence(*self._waits, wait_before)
         if states.time.size:
             self._evidence.take(states)
-            self._motion.take(states, self._evidence)
         history = self._evidence.history
         if order.rigid:
             return LegFindings(contact=self._evidence.find_contact())
@@ -334,9 +332,9 @@ class Observer:
     def _find_flight(self, order: Order, history: History) -> LegFindings:
         """Return the findings of a deformable leg."""
         now = float(history.time[-1])
-        flights = self._evidence.flights(self._motion.wait)
+        flights = self._evidence.flights()
         free = self._evidence.free_since(now)
-        wait = self._motion.wait(free, now)
+        wait = self._evidence.motion.wait(free, now)
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
@@ -356,7 +354,7 @@ class Observer:
             tr=tr,
             idle=wait is not None and wait.source == "at-rest",
             short=short_flights,
-            swing=self._motion.longest_swing(now),
+            swing=self._evidence.motion.longest_swing(now),
             steady_from=swing.flight if swing else 0.0,
             swing_warning=swing.told if swing else "",
         )

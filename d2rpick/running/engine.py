@@ -177,10 +177,9 @@ class Solver:
 
     def clear(self, number: int) -> None:
         """Remove the files of an earlier leg with this number."""
-        suffixes = (".ctl", ".out", ".log")
-        paths = [self.file(number, suffix) for suffix in suffixes]
-        for path in (self.history(number), *paths, *self._list_restarts(number)):
-            path.unlink(missing_ok=True)
+        for path in self.folder.glob(f"{self.name}_{number:04d}[._]*"):
+            path.unlink()
+        self.history(number).unlink(missing_ok=True)
 
     def start(self, command: Sequence[str], number: int) -> None:
         """Start the solver on a leg.
@@ -242,11 +241,8 @@ class Solver:
     def silent_for(self) -> float:
         """Return the time since the solver last wrote anything [s]."""
         now = time.time()
-        paths = self.folder.glob(f"{self.name}*")
-        written = max(
-            (path.stat().st_mtime for path in paths if path.exists()), default=now
-        )
-        return max(0.0, now - written)
+        times = [status.st_mtime for status in self._list_status("*")]
+        return max(0.0, now - max(times, default=now))
 
     def ended_well(self, number: int) -> bool:
         """Return True if the listing of a leg reports its normal end."""
@@ -264,16 +260,14 @@ class Solver:
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
         """
-        of_starter = self._list_restarts(0)
-        sizes = {_get_domain(path): path.stat().st_size for path in of_starter}
-        restarts = self._list_restarts(number)
-        if not sizes or not sizes.keys() <= {_get_domain(path) for path in restarts}:
+        of_starter, restarts = self._find_restarts(0), self._find_restarts(number)
+        if not of_starter or not of_starter.keys() <= restarts.keys():
             return False
-        has_names = all(_has_its_name(path) for path in of_starter)
-        for path in restarts:
-            least_size = max(_WHOLE * sizes.get(_get_domain(path), 1), 1)
-            is_named = _has_its_name(path) or not has_names
-            if path.stat().st_size < least_size or not is_named:
+        for domain, first in of_starter.items():
+            restart = restarts[domain]
+            is_named = _has_its_name(restart) or not _has_its_name(first)
+            least_size = max(_WHOLE * first.stat().st_size, 1)
+            if not is_named or restart.stat().st_size < least_size:
                 return False
         return True
 
@@ -300,25 +294,23 @@ class Solver:
         lines = lines[:_MOST_LINES] if errors else lines[-_MOST_LINES:]
         text = " | ".join(" ".join(line.split()) for line in lines)
         ended = f"ended by signal {self._signal}; " if self._signal else ""
+        free = shutil.disk_usage(self.folder).free
+        if free < self._measure_largest_restart():
+            # A solver that cannot write prints no error, only what it last wrote.
+            ended += f"the disk is full, {free / 1e6:.3g} MB are free; "
         return ended + (make_printable(text) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
         """Remove all restarts except those of these legs and of the starter."""
         for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
-            for path in self._list_restarts(number):
+            for path in self._find_restarts(number).values():
                 path.unlink()
 
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
-        sizes = [
-            path.stat().st_size
-            for path in self.folder.iterdir()
-            if path.suffix == ".rst"
-        ]
-        histories = [self.history(leg) for leg in range(number)]
-        written = sum(path.stat().st_size for path in histories if path.exists())
+        written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
         to_come = round(written * share / max(1 - share, 0.1))
-        needed = 2 * max(sizes, default=0) + to_come
+        needed = 2 * self._measure_largest_restart() + to_come
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -330,13 +322,20 @@ class Solver:
         """Return the last bytes of a file of a leg as text; "" if it is missing."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
 
-    def _list_restarts(self, number: int) -> list[Path]:
-        return list(self.folder.glob(f"{self.name}_{number:04d}_*.rst"))
+    def _find_restarts(self, number: int) -> dict[str, Path]:
+        """Return the restarts of a leg by their domains, the ends of their names."""
+        paths = self.folder.glob(f"{self.name}_{number:04d}_*.rst")
+        return {path.name[-8:]: path for path in paths}
 
+    def _measure_largest_restart(self) -> int:
+        """Return the size of the largest restart file of the run [bytes]; 0 without any."""
+        sizes = (status.st_size for status in self._list_status("_*.rst"))
+        return max(sizes, default=0)
 
-def _get_domain(restart: Path) -> str:
-    """Return the number of the domain at the end of the name of a restart, with its suffix."""
-    return restart.name[-8:]
+    def _list_status(self, pattern: str) -> list[os.stat_result]:
+        """Return the status of the files whose name is that of the run with a pattern."""
+        paths = self.folder.glob(f"{self.name}{pattern}")
+        return [path.stat() for path in paths if path.exists()]
 
 
 def _has_its_name(restart: Path) -> bool:

@@ -12,10 +12,9 @@ from d2rpick.running.inner_motion import check_wait
 from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.history import History
-    from d2rpick.running.inner_motion import InnerMotion
     from d2rpick.running.witness import Quiet
 
     # Events of past flights, keyed by the start of the flight and the time at which it was seen.
@@ -43,7 +42,7 @@ class Event(NamedTuple):
 
 
 def find_events(
-    evidence: GrowingEvidence, motion: InnerMotion, decided: Decided | None = None
+    evidence: GrowingEvidence, decided: Decided | None = None
 ) -> tuple[Event, ...]:
     """Return all events in the order in which they were seen.
 
@@ -55,19 +54,25 @@ def find_events(
     RangeError
         If a given wait is too short.
     """
-    flights = evidence.flights(motion.wait)
-    rigid_times = evidence.rigid_times()
+    flights = evidence.flights()
+    rigid_times = evidence.find_rigid_times()
     history = evidence.history
     if decided is None:
         decided = {}
     events: list[Event] = []
     for flight in flights:
         if flight.wait.source == "given":
-            longest = motion.longest(flight.seen)
+            longest = evidence.motion.longest(flight.seen)
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(history, flight, decided)
-    events = [event for event in events if not _is_rigid(event.tr, rigid_times)]
-    if history.time.size and not (flights and flights[0].start <= history.time[0]):
+    for start, _, end in rigid_times:
+        # No switch is advised where parts are rigid already.
+        events = [
+            event
+            for event in events
+            if event.tr is None or not start <= event.tr <= end
+        ]
+    if not flights or flights[0].start > history.time[0]:
         push = evidence.find_contact(fewest=1)
         if push is not None:
             events.append(Event("load", push, push, "a force acts"))
@@ -75,17 +80,8 @@ def find_events(
     return tuple(sorted(events, key=lambda event: event.seen or 0.0))
 
 
-def _is_rigid(
-    tr: float | None, rigid_times: tuple[tuple[float, float, float], ...]
-) -> bool:
-    """Return True if parts are already rigid at an advised tr."""
-    if tr is None:
-        return False
-    return any(start <= tr <= end for start, _, end in rigid_times)
-
-
 def _describe_rigid_times(
-    history: History, rigid_times: tuple[tuple[float, float, float], ...]
+    history: History, rigid_times: Sequence[tuple[float, float, float]]
 ) -> Iterator[Event]:
     """Yield the events at which parts become rigid or deformable; bodies that are always rigid have none."""
     for start, seen_at, end in rigid_times:

@@ -15,7 +15,13 @@ from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, select_states
 from d2rpick.histories.samples import find_stretches
-from d2rpick.running.record import GrowingColumn, GrowingRecord, find_momenta
+from d2rpick.running.inner_motion import InnerMotion
+from d2rpick.running.record import (
+    GrowingColumn,
+    GrowingRecord,
+    RunningMaximum,
+    find_momenta,
+)
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
@@ -25,22 +31,31 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.running.witness import Needed
+    from d2rpick.running.inner_motion import Wait
 
 # Largest number of states before and in a flight from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
 
 class GrowingEvidence:
-    """Finds the time without force, and the flights, of the parts of a growing record."""
+    """Finds the time without force, and the flights, of the parts of a growing record.
 
-    def __init__(self) -> None:
+    ``given``, ``of_deck`` and ``before`` are those of its inner ``motion``.
+    """
+
+    def __init__(
+        self,
+        given: float | None = None,
+        of_deck: Wait | None = None,
+        before: float = 0.0,
+    ) -> None:
+        self.motion = InnerMotion(self, given, of_deck, before)
         self._record = GrowingRecord()
         self._witnesses: list[GrowingWitness] = []
         # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
         self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        self._has_moved: NDArray[np.bool_] = np.zeros((1, 1), np.bool_)
+        self._has_moved = RunningMaximum()
         # For each state, True if the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
         self._largest_momentum = 0.0
@@ -73,6 +88,7 @@ class GrowingEvidence:
             motionless = np.zeros((balance.time.size, 3))
             columns = _make_columns(balance.time, motionless, balance)
             self._add((), None, columns, (None, balance))
+        self.motion.take(states)
 
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
@@ -88,7 +104,10 @@ class GrowingEvidence:
             largest = float(np.abs(of_model.values).max(initial=0.0))
             self._largest_momentum = max(self._largest_momentum, largest)
         self._complete.add(are_complete)
-        has_moved = self._find_moved(momenta)
+        if self._first_momenta is None:
+            self._first_momenta = momenta.values[:1]
+        changed = (momenta.values != self._first_momenta).any(axis=2)
+        has_moved = self._has_moved.add(changed)
         moves = has_moved & are_complete[:, np.newaxis]
         changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
@@ -126,24 +145,13 @@ class GrowingEvidence:
         if used.size and not used[-1]:
             self._going_on.pop(key, None)
 
-    def _find_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Return which parts have changed their momentum by each of these states, shape (k, parts)."""
-        if self._first_momenta is None:
-            self._first_momenta = momenta.values[:1]
-            self._has_moved = np.zeros((1, momenta.values.shape[1]), np.bool_)
-        changed = (momenta.values != self._first_momenta).any(axis=2)
-        changes = np.concatenate([self._has_moved, changed])
-        has_moved = np.logical_or.accumulate(changes, axis=0)[1:]
-        self._has_moved = has_moved[-1:]
-        return has_moved
-
-    def flights(self, needed: Needed) -> tuple[Quiet, ...]:
-        """Return all flights that were long enough, in ascending order; ``needed`` returns the wait at a state.
+    def flights(self) -> tuple[Quiet, ...]:
+        """Return all flights that lasted for their wait, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         for witness in self.witnesses:
-            witness.examine(needed, self._find_gravity)
+            witness.examine(self.motion.wait, self._find_gravity)
         candidates = [
             (flight, float(witness.time[-1]))
             for witness in self.witnesses
@@ -205,24 +213,20 @@ class GrowingEvidence:
                 return contacts[0] if contacts else None
         return None
 
-    def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
+    def find_rigid_times(self) -> list[tuple[float, float, float]]:
         """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
 
         The last of these periods may last to the end of the record.
         """
         momenta = find_momenta(self.history, of_parts=True)
         if momenta is None:
-            return ()
-        time = momenta.time
-        is_rigid = ~self._complete.rows.astype(np.bool_)
-        return tuple(
-            (
-                float(time[stretch.start]),
-                float(time[stretch.start + FEWEST - 1]),
-                float(time[min(stretch.stop, time.size - 1)]),
-            )
-            for stretch in find_stretches(is_rigid, FEWEST)
-        )
+            return []
+        rigid_times = []
+        for stretch in find_stretches(self._complete.rows == 0, FEWEST):
+            end = min(stretch.stop, momenta.time.size - 1)
+            states = [stretch.start, stretch.start + FEWEST - 1, end]
+            rigid_times.append(tuple(momenta.time[states].tolist()))
+        return rigid_times
 
 
 def highest_energy(history: History, start: float, end: float) -> float:

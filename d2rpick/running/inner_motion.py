@@ -16,14 +16,14 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.record import GrowingColumn, find_momenta
+from d2rpick.running.record import GrowingColumn, RunningMaximum, find_momenta
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.running.evidence import GrowingEvidence
 
 # A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
@@ -87,7 +87,7 @@ class _Motion:
         # The first half period is empty: it ends when the motion is first seen.
         self._swings: list[_HalfPeriod] = []
         self._columns = GrowingColumn()  # time, value, and least change that is a swing
-        self._lowest, self._highest = np.inf, -np.inf
+        self._highest, self._lowest = RunningMaximum(), RunningMaximum()
         # States at the last turning point and at the extreme value since then, and 1 if values rise, -1 if they fall.
         self._turn, self._extreme, self._sign = 0, 0, 1
 
@@ -100,15 +100,13 @@ class _Motion:
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
         """Append states (k,) and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
-        lows = np.minimum(np.minimum.accumulate(values), self._lowest)
-        highs = np.maximum(np.maximum.accumulate(values), self._highest)
-        self._lowest, self._highest = float(lows[-1]), float(highs[-1])
-        limits = np.maximum(_SWING * (highs - lows), least_swing)
+        ranges = self._highest.add(values) + self._lowest.add(-values)
+        limits = np.maximum(_SWING * ranges, least_swing)
         first = self._columns.size
         self._columns.add(np.column_stack([time, values, limits]))
         rows = self._columns.rows
         if not self._swings:
-            moved = np.flatnonzero(highs - lows > limits)
+            moved = np.flatnonzero(ranges > limits)
             if not moved.size:
                 return
             first += int(moved[0])
@@ -184,47 +182,44 @@ class _Longest(NamedTuple):
 class InnerMotion:
     """The wait at each state of a record, from the inner motion up to that state.
 
+    ``evidence`` shows which parts move, and since when no force has acted.
     ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
     """
 
     def __init__(
         self,
+        evidence: GrowingEvidence,
         given: float | None = None,
         of_deck: Wait | None = None,
         before: float = 0.0,
     ) -> None:
+        self._evidence = evidence
         self._given, self._least = given, of_deck
         self._half_of_springs = of_deck.time if of_deck else np.inf
         if before > (of_deck.time if of_deck else 0.0):
             self._least = Wait(before, "record", "as in the flight before")
-        self._evidence = GrowingEvidence()
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._part_motions: list[_Motion] = []
         # Motions that still continue, keyed by the indices of part and axis.
         self._going_on: dict[tuple[int, int], _Motion] = {}
         self._heavy: tuple[int, ...] = ()
-        self._largest_speed = self._largest_energy = 0.0
+        self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which on the motions of parts count, no longer that of the energy [time].
         self._parts_since = np.inf
         # Longest half periods in the order in which they became known.
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
-    def take(self, states: History, evidence: GrowingEvidence) -> None:
-        """Append states that the ``evidence`` already contains."""
-        self._evidence = evidence
+    def take(self, states: History) -> None:
+        """Append states that the evidence already contains."""
         momenta = find_momenta(states, of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses)
             for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):
                 self._learn(swing, motion, self._longest_of_parts)
-        if states.time.size:
-            largest = np.maximum.accumulate(np.abs(states.energy))
-            largest = np.maximum(largest, self._largest_energy)
-            self._largest_energy = float(largest[-1])
-            least_swing = _AT_REST * largest
-            for swing in self._energy.add(states.time, states.energy, least_swing):
-                self._learn(swing, self._energy, self._longest_of_energy)
+        least_swing = _AT_REST * self._largest_energy.add(np.abs(states.energy))
+        for swing in self._energy.add(states.time, states.energy, least_swing):
+            self._learn(swing, self._energy, self._longest_of_energy)
 
     def _follow_parts(
         self, momenta: Momenta, masses: Samples
@@ -246,9 +241,7 @@ class InnerMotion:
             time = momenta.time[states]
             self._parts_since = min(self._parts_since, float(time[0]))
             velocity = momenta.values[states][:, members].sum(axis=1) / whole
-            speeds = np.maximum.accumulate(np.abs(velocity).max(axis=1))
-            speeds = np.maximum(speeds, self._largest_speed)
-            self._largest_speed = float(speeds[-1])
+            speeds = self._largest_speed.add(np.abs(velocity).max(axis=1))
             for number in heavy:
                 relative = momenta.values[states, number] - masses[number] * velocity
                 least_swing = masses[number] * _AT_REST * speeds

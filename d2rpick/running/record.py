@@ -51,6 +51,20 @@ class GrowingColumn:
         return self._room[: self.size]
 
 
+class RunningMaximum:
+    """The largest of all values so far, by which a limit at a state depends on no later one."""
+
+    def __init__(self) -> None:
+        self._last: NDArray[Any] | None = None
+
+    def add(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Append values (k, ...) and return the largest so far at each of them."""
+        before = values[:0] if self._last is None else self._last
+        maxima = np.maximum.accumulate(np.concatenate([before, values]), axis=0)
+        self._last = maxima[-1:]
+        return maxima[len(before) :]
+
+
 class GrowingRecord:
     """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 

@@ -195,7 +195,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     elif last.until >= limits.end:
         return None
     elif last.kind == PROBE:
-        order = last.following(PROBE, _determine_probe_end(legs, last.until, limits))
+        order = _order_probe(last, legs, limits)
     elif last.kind == RIGID:
         order = _follow_window(last, findings, limits)
     else:
@@ -218,11 +218,10 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
     )
     if not switches:
         return _order_load(last, findings, limits)
-    if findings.idle or findings.tr > last.start:
-        return last.following(PROBE, _determine_probe_end(legs, last.until, limits))
-    # The energy was higher at the start of the leg, so the probe replaces the leg.
-    until = _determine_probe_end(legs, last.start, limits)
-    return last._replace(kind=PROBE, until=until)
+    if not findings.idle and findings.tr <= last.start:
+        # The energy was higher at the start of the leg, so the probe replaces the leg.
+        last = last._replace(number=last.number - 1, until=last.start)
+    return _order_probe(last, legs, limits)
 
 
 def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
@@ -245,16 +244,17 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
     return last.following(LOAD, limits.until_end(until))
 
 
-def _determine_probe_end(legs: Sequence[Leg], now: float, limits: Limits) -> float:
-    """Return the end of the next leg of a probe; the leg begins at ``now``, the probe there or in an earlier leg."""
-    flown = now - _get_first_rigid_leg(legs).start if legs[-1].order.rigid else 0.0
+def _order_probe(last: Order, legs: Sequence[Leg], limits: Limits) -> Order:
+    """Order the next leg of a probe, which begins at the end of ``last`` or has begun in an earlier leg."""
+    now = last.until
+    flown = now - _get_first_rigid_leg(legs).start if last.rigid else 0.0
     length = max(
         get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * flown,
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
     )
-    return limits.until_end(now + length)
+    return last.following(PROBE, limits.until_end(now + length))
 
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:

@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.position_error import MOST_OF_PATH, find_drift_in_flight
-from d2rpick.histories.samples import find_window, integrate_by_trapezia
+from d2rpick.flight.position_error import (
+    MOST_OF_PATH,
+    find_drift_in_flight,
+    integrate_displacements,
+)
+from d2rpick.histories.samples import find_window
 from d2rpick.running.record import find_momenta
 
 if TYPE_CHECKING:
@@ -70,14 +74,13 @@ def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | Non
     ]
     if len(pair) != 2:
         return None
-    light, heavy = sorted(pair, key=lambda number: float(masses[number]))
-    velocity = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
-    relative = momenta.values[inside][:, heavy] / masses[heavy] - velocity
-    displacement = integrate_by_trapezia(time, relative)
-    error = np.linalg.norm(displacement - displacement[-1], axis=1).max()
-    path = integrate_by_trapezia(time, np.linalg.norm(velocity, axis=1))[-1]
-    name = momenta.parts[light].name
-    return _make_swing(name, float(error), float(path), tr - start, at_most=True)
+    light, heavy = np.argsort(masses[pair]).tolist()
+    velocity = momenta.values[inside][:, pair] / masses[pair, np.newaxis]
+    displacements, path = integrate_displacements(time, velocity, masses[pair])
+    of_heavy = displacements[:, heavy]
+    error = float(np.linalg.norm(of_heavy - of_heavy[-1], axis=1).max())
+    name = momenta.parts[pair[light]].name
+    return _make_swing(name, error, float(path[-1]), tr - start, at_most=True)
 
 
 def _make_swing(

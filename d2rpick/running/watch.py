@@ -9,19 +9,18 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_names
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
 from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
+from d2rpick.running.inner_motion import wait_of_deck
 from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
@@ -38,6 +37,14 @@ _NO_EVIDENCE: Final = (
     "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
 )
+
+
+class Stamp(NamedTuple):
+    """What changes when a file is written: its number, its size, and the time at which it was ``written`` [s]."""
+
+    number: int
+    size: int
+    written: float
 
 
 class Watch:
@@ -59,7 +66,7 @@ class Watch:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self._looks = Looks(*self._of_looks)
         self._begin_again()
-        self._files: dict[str, os.stat_result] = {}
+        self._files: dict[str, Stamp] = {}
         self._events: tuple[Event, ...] = ()  # events reported so far
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
@@ -68,8 +75,7 @@ class Watch:
 
     def _begin_again(self) -> None:
         """Forget all states of the run, but not the reported events."""
-        self._evidence = GrowingEvidence()
-        self._motion = InnerMotion(*self._waits)
+        self._evidence = GrowingEvidence(*self._waits)
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
@@ -81,12 +87,12 @@ class Watch:
             If the files cannot be read although nothing is written to them any more, they contain nothing that shows a
             force, or the given wait is too short.
         """
-        files, files_before = _find_files(self._names), self._files
-        if _list_stamps(files) != _list_stamps(files_before):
+        files = find_files(self._names)
+        if files != self._files:
             self._files = files
             self._report_silence_after = _SILENT
             try:
-                yield from self._read([*files], _is_rewritten(files_before, files))
+                yield from self._read([*files])
                 self._error = None
             except (FormatError, HistoryError) as error:
                 self._error = error  # The solver may just be writing the file.
@@ -94,7 +100,7 @@ class Watch:
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
         now = time.time()
-        written = max((status.st_mtime for status in files.values()), default=now)
+        written = max((stamp.written for stamp in files.values()), default=now)
         silence = now - written
         if self._error and silence > _SILENT:
             raise self._error
@@ -122,7 +128,7 @@ class Watch:
                 time, message = None, f"no flight since {event.time:.6g}"
         if (
             time is None
-            and self._motion.longest(self._last_time) is None
+            and self._evidence.motion.longest(self._last_time) is None
             and self._waits[0] is None
         ):
             message += (
@@ -130,7 +136,7 @@ class Watch:
             )
         return self._make_event("state", message)._replace(time=time)
 
-    def _read(self, names: Sequence[str], is_rewritten: bool) -> Iterator[Event]:
+    def _read(self, names: Sequence[str]) -> Iterator[Event]:
         """Read the new states and return their events."""
         if not names:
             return
@@ -143,17 +149,15 @@ class Watch:
         if not follows:
             self._begin_again()
         self._evidence.take(states)
-        self._motion.take(states, self._evidence)
         time = self._evidence.history.time
         now, before = float(time[-1]), self._last_time
-        events = find_events(self._evidence, self._motion, self._decided)
-        kept_count = len(self._events)
+        events = find_events(self._evidence, self._decided)
+        pairs = zip(self._events, events, strict=False)
+        kept_count = sum(event == event_before for event, event_before in pairs)
         if before is None:
             message = f"the run has reached {now:.6g}"
             yield Event("begun", float(time[0]), now, message)
-        elif is_rewritten or now < before:
-            pairs = zip(self._events, events, strict=False)
-            kept_count = sum(event == event_before for event, event_before in pairs)
+        elif now < before or kept_count < len(self._events):
             message = (
                 f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
             )
@@ -203,8 +207,8 @@ def follow(
         rest(min(pause, remaining))
 
 
-def _find_files(names: Sequence[str]) -> dict[str, os.stat_result]:
-    """Return the non-empty files of a run, including those of later legs in the same folder, with their status."""
+def find_files(names: Sequence[str]) -> dict[str, Stamp]:
+    """Return the non-empty files of a run, including those of later legs in the same folder, with their stamps."""
     try:
         paths = expand(names)
     except FormatError as error:
@@ -216,25 +220,5 @@ def _find_files(names: Sequence[str]) -> dict[str, os.stat_result]:
         with suppress(OSError):  # The file may not exist yet, or no longer.
             status = Path(path).stat()
             if status.st_size:
-                files[path] = status
+                files[path] = Stamp(status.st_ino, status.st_size, status.st_mtime)
     return files
-
-
-def _list_stamps(
-    files: Mapping[str, os.stat_result],
-) -> list[tuple[str, int, int, int]]:
-    """Return, for each file, the properties that change when it is written."""
-    return [
-        (name, status.st_ino, status.st_size, status.st_mtime_ns)
-        for name, status in files.items()
-    ]
-
-
-def _is_rewritten(
-    files_before: Mapping[str, os.stat_result], files: Mapping[str, os.stat_result]
-) -> bool:
-    """Return True if a file is gone or has become shorter."""
-    return any(
-        name not in files or files[name].st_size < status.st_size
-        for name, status in files_before.items()
-    )

@@ -71,8 +71,8 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 def get_inner_window(history: History, guess: Span) -> Span:
     """Return the part of a guessed window made of complete 1/16 of the record, so that many td share few windows."""
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
     if guess.end >= last:
@@ -93,8 +93,8 @@ def get_outer_window(history: History, guess: Span) -> Span:
     >>> get_outer_window(history, Span(2.3, 7.9)), get_outer_window(history, Span(0.0, 15.1))
     (Span(start=2.0, end=8.0), Span(start=0.0, end=16.0))
     """
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     part = (last - first) / _PARTS
     start = first + part * np.floor((guess.start - first) / part)
     end = first + part * np.ceil((guess.end - first) / part)
@@ -107,8 +107,8 @@ def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[S
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
             yield inner
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     for share in _BEGINNINGS:
         beginning = first + share * (last - first)
         if beginning < td:

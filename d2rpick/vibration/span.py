@@ -88,9 +88,9 @@ class Span(NamedTuple):
 def limit_bounds(
     bounds: Span, td: float, after: float | None, landing: float | None
 ) -> Span:
-    """Return bounds that begin at the end of the load and end at the landing, as far as they are given [time].
+    """Return bounds that begin at the end of the load ``after`` and end at the landing, if these are given [time].
 
-    They always contain td.
+    A given time on the other side of td cuts the bounds at td.
     """
     if after is not None:
         bounds = bounds._replace(start=min(after, td))

@@ -1,5 +1,6 @@
 """Times with a unit as arguments of Python: converted to the unit of the run, or refused with the numbers to give."""
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +8,8 @@ import numpy as np
 import pytest
 
 import d2rpick as d2
-from tests.command import ENERGY
+from d2rpick.deck import find_time_unit
+from tests.command import ENERGY, ROOT, read_refusal, run
 
 if TYPE_CHECKING:
     from d2rpick.api.arguments import Time
@@ -127,3 +129,86 @@ def test_limits_and_kinds_hold_for_texts_too(tmp_path: Path) -> None:
         d2.suggest(run, td=64, tolerance=no_time)
     with pytest.raises(TypeError, match="td is '64mm', a number was expected"):
         d2.suggest(run, td="64mm")
+
+
+PLATE = ROOT / "sample_data" / "falling_plate"
+
+
+def copy_plate(folder: Path, of_deck: str, of_run: str) -> str:
+    """Copy the deck of the falling plate, with these units of time in /BEGIN; without any for an empty text."""
+    shutil.copytree(PLATE, folder)
+    starter = folder / "plate_0000.rad"
+    text = starter.read_text()
+    if of_deck:
+        units = "".join(
+            f"{'kg':>20}{'m':>20}{unit:>20}\n" for unit in (of_deck, of_run)
+        )
+        text = text.replace(
+            "      2022         0\n", f"      2022         0\n{units}", 1
+        )
+    starter.write_text(text)
+    return str(starter)
+
+
+@pytest.mark.parametrize(
+    ("units", "unit", "wait"),
+    [(("s", "s"), "s", 0.02), (("ms", "ms"), "ms", 20.0), (("mus", "mus"), "us", 2e4)],
+)
+def test_a_first_run_takes_the_unit_of_its_deck(
+    tmp_path: Path, units: tuple[str, str], unit: str, wait: float
+) -> None:
+    deck = copy_plate(tmp_path / "run", *units)
+    assert find_time_unit(deck) == unit
+    written = d2.first(deck, tmp_path / "first", parts=1, wait="20ms")
+    assert written.wait == pytest.approx(wait)
+    by_number = d2.first(deck, tmp_path / "second", parts=1, wait=wait)
+    for name, same in zip(written.files, by_number.files, strict=True):
+        assert Path(name).read_bytes() == Path(same).read_bytes()
+    typed = ("first", "--part", "1", "--wait", "20ms", deck, "-o", str(tmp_path / "3"))
+    assert run(*typed).exit_code == 0
+
+
+@pytest.mark.parametrize("units", [("", ""), ("s", "ms")])
+def test_a_deck_that_names_no_unit_or_two_gives_the_numbers(
+    tmp_path: Path, units: tuple[str, str]
+) -> None:
+    deck = copy_plate(tmp_path / "run", *units)
+    assert find_time_unit(deck) == ""
+    expected = (
+        "the unit of time is not known from .*; give 0.02 if it is s, 20 if it is ms"
+    )
+    for name in ("wait", "after"):
+        times: Any = {"wait": 1.0, name: "20ms"}
+        with pytest.raises(ValueError, match=expected):
+            d2.first(deck, tmp_path / "first", parts=1, **times)
+    assert not (tmp_path / "first").exists()
+    drive = ("drive", deck, "--part", "1", "--wait", "20ms", "-o", str(tmp_path / "d"))
+    assert "give 0.02 if it is s" in read_refusal(*drive)
+
+
+def test_a_followed_run_takes_the_unit_of_its_deck() -> None:
+    history = str(ROOT / "sample_data" / "rolloverT01.gz")
+    flying_box = str(ROOT / "sample_data" / "flying_box" / "BOX_0000.rad")
+    typed, numbers = (
+        [*d2.follow(history, wait=wait, deck=flying_box, lasting=0)]
+        for wait in ("400ms", 0.4)
+    )
+    assert typed == numbers
+    with pytest.raises(ValueError, match="no deck is given; give 0"):
+        d2.follow(history, wait="5ms", lasting=0)
+
+
+def test_the_end_of_a_card_of_an_answer_has_the_unit_of_its_run(tmp_path: Path) -> None:
+    answer = d2.suggest(d2.read(write_in(tmp_path, "ms")), td="68.7534ms")
+    options: Any = {"solver": "radioss", "node": 1001}
+    typed, number = (answer.card(end=end, **options) for end in ("0.15s", 150.0))
+    assert typed is not None
+    assert number is not None
+    assert typed.card.text == number.card.text
+    plan = d2.plan(d2.read(write_in(tmp_path, "ms")))
+    planned = plan.card(end="0.15s", **options)
+    assert planned is not None
+    assert "150.0" in planned.card.text
+    without = d2.suggest(d2.read(ENERGY), td=0.0687534)
+    with pytest.raises(ValueError, match=r"give 0\.15 if it is s, 150 if it is ms"):
+        without.card(end="150ms", **options)

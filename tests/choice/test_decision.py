@@ -1,5 +1,7 @@
 """One verdict on a pair: the same in every command, with a reason and a cure unless it is good."""
 
+from html import unescape
+
 import pytest
 
 import d2rpick as d2
@@ -80,3 +82,19 @@ def test_a_poor_pair_names_the_pair_to_use_instead() -> None:
     judged = d2.verify(d2.read(ENERGY), tr=0.0128853, td=0.064)
     assert require(judged.better).td == pytest.approx(0.0687534, abs=1e-6)
     assert "tr = 0.0135867, td = 0.0687534" in judged.decision.cure
+
+
+def test_a_notebook_shows_reason_and_cure_with_every_verdict() -> None:
+    run = d2.read(MATSUM)
+    plan = d2.plan(run)
+    study = d2.study([ENERGY], 0.064)
+    suggestion = d2.suggest(d2.read(ENERGY), 0.064)
+    planned = [require(row.decision) for row in plan.flights if row.window]
+    decision = require(suggestion.decision)
+    for answer, texts in (
+        (plan, [text for judged in planned for text in (judged.reason, judged.cure)]),
+        (suggestion, [decision.reason, decision.cure]),
+        (study, [decision.reason, decision.cure]),
+    ):
+        shown = unescape(answer._repr_html_())
+        assert all(text and text in shown for text in texts)

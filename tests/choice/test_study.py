@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.api.studies import find_runs
-from d2rpick.choice.answers import verify_in_history
+from d2rpick.choice.answers import suggest_in_history, verify_in_history
 from d2rpick.choice.question import Settings
 from d2rpick.choice.runs.study import (
     NONE,
@@ -21,12 +21,14 @@ from d2rpick.choice.runs.study import (
     find_cut_runs,
     find_fewest_digits,
     find_outliers,
+    find_repeated_runs,
     judge_run,
     make_failed_row,
 )
 from d2rpick.histories.opening import Selection
+from d2rpick.report.study import list_outcome, name_target_energy
 from tests import variants
-from tests.command import BOX, GLSTAT
+from tests.command import BOX, ENERGY, GLSTAT, ROOT
 from tests.computed import locate_stored
 from tests.energies import require
 from tests.reading import read_history
@@ -177,6 +179,61 @@ def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
     assert require(single_study.common.errors[0]) == pytest.approx(
         run_row.residual, abs=1e-3
     )
+
+
+def test_a_run_given_twice_or_copied_is_called_a_repetition(tmp_path: Path) -> None:
+    name = variants.write(tmp_path / "run.csv")
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(Path(name).read_bytes())
+    link = tmp_path / "link.csv"
+    link.symlink_to(name)
+    for twin in (name, str(copy), str(link)):
+        answer = compare_rows(
+            variants.TD, [judge_run(ASKED, source) for source in (name, twin)]
+        )
+        (caution,) = (c for c in answer.cautions if c.code == "repeated-runs")
+        assert "rests on 1 of 2 runs" in caution.message
+        assert (
+            "repeated",
+            "1 run has the same content as another run",
+        ) in list_outcome(answer)
+
+
+def test_runs_with_other_content_are_no_repetitions(tmp_path: Path) -> None:
+    """One digit that does not change the answer is enough, even if the files have the same size."""
+    name = variants.write(tmp_path / "run.csv")
+    text = Path(name).read_text()
+    other = tmp_path / "other.csv"
+    other.write_text(text[:-2] + str((int(text[-2]) + 1) % 10) + text[-1:])
+    assert other.stat().st_size == Path(name).stat().st_size
+    answer = compare_rows(
+        variants.TD, [judge_run(ASKED, source) for source in (name, str(other))]
+    )
+    assert not find_repeated_runs(answer.runs)
+    assert "repeated-runs" not in {caution.code for caution in answer.cautions}
+    # runs without files, such as those of a failed process, are not compared
+    assert not find_repeated_runs([make_failed_row("a", OSError("x"))] * 2)
+
+
+def test_a_poor_td_is_cured_by_the_pair_that_suggest_names() -> None:
+    run_row = judge_run(replace(ASKED, td=0.064), ENERGY)
+    decision = suggest_in_history(
+        read_history([ENERGY], ASKED.selection), 0.064, Settings()
+    ).decision
+    assert run_row.verdict == "do not use"
+    assert run_row.cure == require(decision).cure
+    assert run_row.cure is not None
+    assert run_row.cure.startswith("use tr = 0.0135867, td = 0.0687534")
+
+
+def test_the_unit_of_energy_is_named_if_all_runs_name_it() -> None:
+    table = str(ROOT / "sample_data/rollover_box_excel.csv")
+    rows = [judge_run(replace(ASKED, td=370.0), table)]
+    assert compare_rows(370.0, rows).energy_unit == "mJ"
+    assert name_target_energy(compare_rows(370.0, rows)) == "E(td) [mJ]"
+    rows.append(judge_run(ASKED, ENERGY))
+    assert compare_rows(370.0, rows).energy_unit == ""
+    assert name_target_energy(compare_rows(370.0, rows)) == "E(td)"
 
 
 @given(st.lists(st.floats(1.95, 2.05), min_size=1, max_size=7))

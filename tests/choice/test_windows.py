@@ -30,6 +30,7 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
     LEAST_MARGIN,
     changes_momentum_little,
+    compute_closing_speed,
     compute_margin,
     estimate_grazing_spread,
     estimate_landing_spread,
@@ -138,6 +139,36 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
     assert margin_kept.time == max(
         LEAST_MARGIN * require(flight.end), require(margin_kept.spread)
     )
+
+
+@given(st.floats(0.001, 0.05), positive)
+def test_a_body_that_rises_touches_the_ground_only_by_its_rotation(
+    drift: float, speed: float
+) -> None:
+    """At the contact its centre rises at half of ``speed``; a corner goes down faster than that by the rotation."""
+    history, falling = make_flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
+    (whole,) = history.momenta
+    rising = replace(whole, values=whole.values[::-1] * -1.0)
+    history = replace(history, evidence=Given((rising,), history.balance))
+    flight = falling._replace(gravity=9.81)
+    assert compute_closing_speed(history, flight) == pytest.approx(-speed / 2)
+    spread = require(estimate_spread_of_vibration(history, flight))
+    moved = estimate_landing_spread(history, flight, drift, 1.5 * speed)
+    assert moved == pytest.approx(spread + drift / speed, rel=1e-6)
+    for turning in (None, 0.4 * speed, -speed):
+        grazing = estimate_landing_spread(history, flight, drift, turning)
+        assert grazing == pytest.approx(
+            np.sqrt(2 * (drift + spread * speed / 2) / 9.81), rel=1e-6
+        )
+
+
+def test_a_change_of_momentum_by_rounding_is_not_taken_for_gravity() -> None:
+    history, flight = make_flying_oscillator(10.0, 1e-4, 2.0, 2.0)
+    (whole,) = history.momenta
+    constant = np.broadcast_to([3.0, 0.0, -4.0], whole.values.shape).copy()
+    constant[-1] += [0.0, 2e-6, 1e-6]
+    steady = replace(history, evidence=Given((replace(whole, values=constant),)))
+    assert compute_closing_speed(steady, flight) == pytest.approx(2.5, rel=1e-5)
 
 
 def make_touched_body(force: float) -> tuple[History, Flight]:

@@ -59,6 +59,16 @@ def test_every_command_shows_its_settings(command: str) -> None:
     assert re.search(r"^[\w-]+ = .+  # default$", result.stdout, re.MULTILINE)
 
 
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "rule"])
+def test_settings_are_shown_without_what_a_run_needs(command: str) -> None:
+    """Whoever asks for the settings of a site has no run at hand."""
+    result = run(command, "--show-settings")
+    assert result.exit_code == 0, result.stderr
+    assert re.search(r"^[\w-]+ = .+  # default$", result.stdout, re.MULTILINE)
+    # a run needs what it needed before
+    assert run("suggest").exit_code == 2
+
+
 def test_the_version_names_the_libraries() -> None:
     result = run("--version").stdout.splitlines()
     assert result[0] == f"d2rpick, version {__version__}"

@@ -11,7 +11,10 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
+from d2rpick.api.plans import Exploration
+from d2rpick.report.formats import DisplayOptions
 from tests.command import ENERGY, MATSUM, ROOT, put, run, run_json
+from tests.energies import require
 from tests.json_schemas import run_json_checked
 
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
@@ -236,29 +239,31 @@ def test_what_would_be_better_is_the_pair_that_suggest_names() -> None:
     )
 
 
-def test_the_first_line_is_the_pair_that_suggest_and_plan_choose() -> None:
-    chosen = ("--part", "1,2", "--no-deck", "-q", MATSUM)
-    suggested = run_json("suggest", *chosen[:3], MATSUM)
-    pair = suggested["recommended"]
-    times = f"tr = {pair['tr']:.6g}, td = {pair['td']:.6g}"
-    explored = run("explore", *chosen).stdout
-    first = explored.splitlines()[0]
-    assert first.startswith(f"{suggested['verdict']}  {times}, residual ")
-    assert run("plan", *chosen).stdout.startswith(f"{suggested['verdict']}: ")
-    answer = run_json("explore", *chosen[:3], MATSUM)["answer"]
-    assert answer.startswith(f"{suggested['verdict']}: {times}")
-    assert "best pair" not in explored
+@pytest.fixture(scope="module")
+def explored() -> Exploration:
+    return d2.explore(d2.read(MATSUM), parts="1,2")
 
 
-def test_a_smaller_error_and_a_longer_rigid_time_are_shown_with_what_they_cost() -> (
-    None
-):
-    options = ("explore", "--part", "1,2", "--no-deck", "-q", MATSUM)
-    lines = run(*options).stdout.splitlines()
+def test_the_first_line_is_the_pair_that_suggest_chooses(explored: Exploration) -> None:
+    suggested = d2.suggest(d2.read(MATSUM), parts="1,2")
+    pair = require(suggested.recommended)
+    verdict = require(suggested.decision).verdict
+    times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
+    text = explored.text("table", DisplayOptions())
+    assert text.startswith(f"{verdict}  {times}, residual ")
+    assert explored.answer.startswith(f"{verdict}: {times}")
+    assert "best pair" not in text
+
+
+def test_a_smaller_error_and_a_longer_rigid_time_are_shown_with_what_they_cost(
+    explored: Exploration,
+) -> None:
+    lines = explored.text("table", DisplayOptions()).splitlines()
     named = {line[:13].strip(): line[15:] for line in lines}
-    offers = run_json(*options[:4], MATSUM)["offers"]
+    offers = [
+        offer for offer in explored.to_dict()["offers"] if offer["error"] is not None
+    ]
     (chosen,) = (offer for offer in offers if offer["recommended"])
-    offers = [offer for offer in offers if offer["error"] is not None]
     smallest = min(offers, key=lambda offer: round(offer["error"], 3))
     longest = max(offers, key=lambda offer: offer["rigid_time"])
     lost = 1 - smallest["rigid_time"] / chosen["rigid_time"]

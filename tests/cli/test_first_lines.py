@@ -74,3 +74,35 @@ def test_the_warning_about_few_states_says_which_line_the_verdict_rests_on() -> 
 @pytest.mark.parametrize("value", [None, 0.7])
 def test_the_limit_of_the_kinetic_fraction_uses_its_term(value: float | None) -> None:
     assert Limit("kinetic_share").explain(value, 0.5).startswith("kinetic fraction ")
+
+
+def test_parts_begin_with_the_verdict_of_the_pair_that_plan_chooses() -> None:
+    deck = ("--deck", str(SAMPLES / "rollover_box.k"))
+    document = run_json("parts", *deck, MATSUM)
+    (best,) = (answer for answer in document["sets"] if answer["recommended"])
+    chosen = ",".join(map(str, best["parts"]))
+    (planned,) = run_json("plan", *deck, "--part", chosen, MATSUM)["windows"]
+    for key in ("verdict", "verdict_reason", "cure"):
+        assert best[key] == planned[key]
+    text = join_lines(run("parts", *deck, MATSUM).stdout)
+    assert text.startswith(
+        f"{best['verdict']} make rigid --part {chosen}, all eligible parts (one rigid body); "
+        f"tr = {best['tr']:.6g}, td = {best['td']:.6g} why {best['verdict_reason']} to improve "
+    )
+    assert (
+        "* the recommended set and its parts (d2rpick plan --part recommended)" in text
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "cell"), [((), "next run"), (("--min-rigid", "0.3"), "no run")]
+)
+def test_a_plan_says_in_which_run_a_window_can_be_used(
+    options: tuple[str, ...], cell: str
+) -> None:
+    lines = run("plan", *options, "-q", MATSUM).stdout.splitlines()
+    head = next(
+        at for at, line in enumerate(lines) if "flight" in line and "verdict" in line
+    )
+    assert lines[head].split()[-2:] == ["switch", "in"]
+    assert lines[head + 1].endswith(cell)

@@ -1,14 +1,21 @@
 """Mistakes that users make are answered with what was found, what was expected, and what to do."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
-from tests.command import read_refusal, run
+from tests.command import GLSTAT, ROOT, read_refusal, run, run_json
 
 ENERGY = "sample_data/energy.csv"
 MATSUM = "sample_data/rollover_box.matsum"
 DECK = "sample_data/rollover_box.k"
+DECK_OF_ANOTHER_MODEL = (
+    (ROOT / DECK)
+    .read_text("utf-8")
+    .replace("\nbox\n", "\nfloor\n")
+    .replace("\nstep\n", "\nrail\n")
+)
 
 
 @pytest.mark.parametrize(
@@ -161,6 +168,63 @@ def test_a_missing_include_is_named_without_parts_too(tmp_path: Path) -> None:
     deck.write_text(content.replace("*KEYWORD", include, 1))
     answer = run("plan", "--deck", str(deck), MATSUM)
     assert "main.k:3: missing/mesh.k was not read: no such file" in answer.stderr
+
+
+def test_a_record_with_few_states_names_the_interval_to_ask_for(tmp_path: Path) -> None:
+    lines = Path(ENERGY).read_text().splitlines()
+    coarse = tmp_path / "coarse.csv"
+    coarse.write_text("\n".join([lines[0], *lines[1::125]]) + "\n")
+    document = run_json("suggest", "--td", "0.064", str(coarse))
+    assert document["verdict"] == "do not use"
+    states, start = 5, document["flight"]["start"]
+    assert (
+        f"write the energies every {(0.064 - start) / 200:.2g} or more often, because only {states} states lie"
+        in document["cure"]
+    )
+
+
+def test_a_table_beside_the_databases_of_a_folder_is_named(tmp_path: Path) -> None:
+    shutil.copy(GLSTAT, tmp_path / "glstat")
+    shutil.copy(ENERGY, tmp_path / "a.csv")
+    (tmp_path / "other.csv").write_text("x,y\n1,2\n")
+    result = run("info", str(tmp_path))
+    notes = [line for line in result.stdout.splitlines() if "left out" in line]
+    notes += [line for line in result.stderr.splitlines() if "left out" in line]
+    assert len(notes) == 1
+    assert f"{tmp_path / 'a.csv'} was left out" in notes[0]
+    assert "other.csv" not in notes[0]
+    named = run("info", str(tmp_path / "a.csv"))
+    assert "left out" not in named.stdout + named.stderr
+
+
+@pytest.mark.parametrize("command", ["suggest", "explore", "plan", "verify"])
+def test_a_deck_of_another_model_that_was_given_is_an_objection(
+    tmp_path: Path, command: str
+) -> None:
+    deck = tmp_path / "other.k"
+    deck.write_text(DECK_OF_ANOTHER_MODEL)
+    options = (
+        ["--td-window", "0.3", "0.36"] if command in ("suggest", "explore") else []
+    )
+    options += ["--steps", "4"] if command == "explore" else []
+    options += ["--tr", "0.143139", "--td", "0.345455"] if command == "verify" else []
+    arguments = (command, *options, "--part", "1,2")
+    alone = run(*arguments, "--no-deck", MATSUM)
+    result = run(*arguments, "--deck", str(deck), MATSUM)
+    assert (alone.exit_code, result.exit_code) == (0, 1)
+    assert result.stdout == alone.stdout
+    assert f"exit code 1: {deck} is not the deck of this run" in result.stderr
+    assert run(*arguments, "--deck", str(deck), "--exit-zero", MATSUM).exit_code == 0
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "markdown", "value", "card"])
+def test_a_given_td_is_answered_with_its_verdict_in_every_format(form: str) -> None:
+    result = run("suggest", "--td", "0.2", "--part", "box", "-f", form, MATSUM)
+    assert result.exit_code == 0
+    if form != "value":
+        assert "do not use" in " ".join(result.stdout.replace("$", "").lower().split())
+    strict = ("suggest", "--td", "0.2", "--part", "box", "--min-quality", "fair")
+    assert run(*strict, "-f", form, MATSUM).exit_code == 1
 
 
 def test_a_folder_without_a_run_is_named_by_follow(tmp_path: Path) -> None:

@@ -231,13 +231,27 @@ def test_warnings_go_to_stderr_and_quiet_silences_them_but_not_errors() -> None:
 
 
 def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
-    cut = put(tmp_path / "cut.glstat", Path(GLSTAT).read_bytes()[:-40])
+    cut = put(tmp_path / "cut.csv", Path(ENERGY).read_bytes()[:-40])
     document, result = run_json(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
     assert document["history"]["complete"] is False
     assert "truncated-input" in [warning["code"] for warning in document["warnings"]]
     assert [
         f"note: {note}" for note in document["history"]["notes"]
     ] == result.stderr.splitlines()[:1]
+
+
+def test_a_truncated_file_is_reported_once_with_the_end_of_its_record(
+    tmp_path: Path,
+) -> None:
+    cut = put(tmp_path / "cut.glstat", Path(GLSTAT).read_bytes()[:-40])
+    document, result = run_json(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
+    assert document["history"]["complete"] is False
+    (note,) = document["history"]["notes"]
+    assert "the file ends within" in note
+    (told,) = (line for line in result.stderr.splitlines() if "ends within" in line)
+    end = document["history"]["time_end"]
+    assert told.startswith("warning: truncated-input: the input ends within a state, ")
+    assert f"times after {end:.6g} are unknown; let the run finish, or copy" in told
 
 
 @pytest.mark.parametrize(
@@ -441,7 +455,12 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
         in run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr
     )
     assert (
-        run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""
+        "-f ndjson writes what its name promises"
+        in run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr
+    )
+    pair = ("--tr", "0.0135867", "--td", "0.0687534")
+    assert (
+        run("verify", *pair, "-o", str(tmp_path / "judged.ndjson"), ENERGY).stderr == ""
     )  # it has no ndjson
     assert (
         run(
@@ -518,6 +537,14 @@ def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
     ).split("\r")[1]
     assert long.endswith("/binout0000 and 2 more ... 0 s")
     assert len(long) == 39
+
+
+def test_a_long_computation_is_shown_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with progress.show_computing(quiet=False, period=PERIOD):
+        time.sleep(5 * PERIOD)
+    assert stream.getvalue().split("\r")[1] == "computing ... 0 s"
 
 
 @pytest.mark.parametrize("case", ["no terminal", "quiet", "fast"])

@@ -360,6 +360,11 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
         assert ["/RBODY/ON" in leg for leg in legs] == [True, False, True, False]
         assert all("/TFILE/4" in leg for leg in legs)
     assert legs[0].splitlines()[1].strip() == "0.277"
+    in_sensors = ("--solver", "radioss-sensors", "-f", "json", history)
+    answer = json.loads(run(*args, str(tmp_path / "s"), *in_sensors).stdout)
+    engine_file = (tmp_path / "s" / f"{name}_0001.rad").read_text()
+    step = float(engine_file.partition("/DTIX\n")[2].split()[0])
+    assert answer["fewest_cycles"] == round(0.7 / step) > 1000
     lacking = read_starter("DROP2").partition(b"/RBODY")
     deck.write_bytes(lacking[0] + lacking[2][lacking[2].index(b"/SURF") :])
     (tmp_path / f"{name}_0001.rad").write_text(

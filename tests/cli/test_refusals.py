@@ -195,6 +195,8 @@ rollover --stiffness 1e15 | choose softer bars
 rollover --mesh 100000 | 200
 rollover --scan --tr 0.1 | exclude each other
 rollover --scan --write-as csv | exclude each other
+rollover --scan --with-step | exclude each other
+rollover --with-step | needs --tr and --td
 rollover --jobs 2 | needs --scan
 rollover -f json | needs --scan
 rollover --dt 1e-9 | more than

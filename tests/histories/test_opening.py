@@ -324,7 +324,8 @@ def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(
         in notes
     )
     assert "remarks.txt was left out" in notes
-    assert not by_folder.notes
+    table_note = f"{tmp_path / 'energy.csv'} was left out: a table next to databases of the solver; name it to use it"
+    assert by_folder.notes == (table_note,)
 
 
 def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:

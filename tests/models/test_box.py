@@ -76,6 +76,7 @@ def simulate_box(parameters: Parameters, *windows: RigidWindow) -> Record:
     [
         (COARSE, ()),
         (COARSE, (RigidWindow(0.1, 0.2), RigidWindow(0.3, 0.35))),
+        (COARSE, (RigidWindow(0.1, 0.2, with_step=True), RigidWindow(0.3, 0.35))),
         (
             Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3),
             (RigidWindow(0.03, 0.2),),
@@ -230,6 +231,28 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
     assert switched.bar_updates == pytest.approx(
         steps * of_step + steps / 3 * of_box, rel=0.01
     )
+
+
+def test_a_step_that_is_switched_with_the_box_moves_with_it_and_is_released_with_it() -> (
+    None
+):
+    window = RigidWindow(0.14, 0.3, with_step=True)
+    whole, switched = simulate_box(COARSE), simulate_box(COARSE, window)
+    rigid = (switched.time > window.tr) & (switched.time < window.td)
+    after = (switched.time > window.td) & (switched.time < 0.35)
+    assert np.ptp(switched.internal_energy[rigid], axis=0).max() < 1e-9
+    assert np.ptp(switched.internal_energy[after], axis=0).min() > 0
+    # in flight the whole momentum does not depend on what is rigid
+    np.testing.assert_allclose(
+        switched.momentum[after].sum(axis=1),
+        whole.momentum[after].sum(axis=1),
+        rtol=1e-4,
+    )
+    structure = build_structure(COARSE)
+    bars = structure.box.rest.size + structure.step.rest.size
+    steps = whole.bar_updates / bars
+    spared = (window.td - window.tr) / 0.42
+    assert switched.bar_updates == pytest.approx(steps * (1 - spared) * bars, rel=0.01)
 
 
 @given(ANGLES, st.integers(0, 2**32 - 1))

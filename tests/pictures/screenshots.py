@@ -17,11 +17,11 @@ _HISTORY: Final = "sample_data/energy.csv"  # a page shows the name as it was gi
 _PAGES: Final = {
     "page-suggest": (
         ("suggest", "--td", "0.064", "--exit-zero", _HISTORY),
-        "1000,1250",
+        "1000,1480",
     ),
     "page-explore": (
         ("explore", "--td", "0.064", "--td-window", "0.05", "0.08", _HISTORY),
-        "1000,1250",
+        "1000,1365",
     ),
 }
 

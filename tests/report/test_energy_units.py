@@ -75,3 +75,20 @@ def test_a_sum_has_a_unit_only_if_all_its_terms_have_it(
 ) -> None:
     run = d2.read(write_table(tmp_path, *heads), energy=heads)
     assert d2.suggest(run, td=0.064).situation.history.energy_unit == unit
+
+
+@pytest.mark.parametrize("unit", ["mJ", ""])
+def test_json_measures_and_the_figure_of_study_have_the_unit(
+    tmp_path: Path, unit: str
+) -> None:
+    table = write_table(tmp_path, f"internal_energy_{unit}" if unit else "energy")
+    run = d2.read(table, energy=2)
+    verdict = d2.verify(run, tr=0.0135867, td=0.0687534)
+    for answer in (verdict, d2.suggest(run, 0.064), d2.plan(run)):
+        assert answer.to_dict()["history"]["energy_unit"] == unit
+    name = f"energy at td [{unit}]" if unit else "energy at td "
+    assert name in verdict.text("table", DisplayOptions())
+    study = d2.study([table], td=0.0687534, energy=2)
+    assert [row["energy_unit"] for row in study.to_dict()["runs"]] == [unit]
+    label = f"internal energy [{unit}]" if unit else "internal energy"
+    assert study.plot().axes[0].get_ylabel() == label

@@ -293,6 +293,10 @@ def test_a_leg_is_not_begun_on_a_full_disk(
         solver.check_room(2, 0.5)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=2000))
     solver.check_room(2, 0.5)
+    put(tmp_path / "strip_0001.log", b"TOTAL DISK SPACE USED")
+    assert solver.last_words(1) == "TOTAL DISK SPACE USED"
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=999))
+    assert solver.last_words(1).startswith("the disk is full, 0.000999 MB are free; TO")
 
 
 def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:

@@ -18,16 +18,12 @@ from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.events import find_events
 from d2rpick.running.evidence import GrowingEvidence, highest_energy
-from d2rpick.running.inner_motion import InnerMotion, Wait
+from d2rpick.running.inner_motion import Wait
 from d2rpick.running.witness import Quiet
 from tests.command import ROOT
 from tests.energies import require
 from tests.records import cut_history, make_table
-from tests.running.seen import (
-    find_quiet_times,
-    follow_inner_motion,
-    take_whole_record,
-)
+from tests.running.seen import take_whole_record
 
 # Windows of flights [s]: car with contacts at 2.3-11.8, 28.1-38.5 and 150.4 ms, box that lands at 285.8, 338.4 ms ...
 CAR, BOX = "carT01.gz", "drop2T01.gz"
@@ -66,7 +62,7 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    quiet_spans = find_quiet_times(history, follow_inner_motion(history).wait)
+    quiet_spans = take_whole_record(history).flights()
     assert list_spans(quiet_spans)[: len(expected)] == pytest.approx(
         np.array(expected), abs=5e-4
     )
@@ -82,9 +78,7 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
     for earlier_wait in (None, Wait(0.018, "record", "as in the flight before")):
         waits = [
             span.wait.time
-            for span in find_quiet_times(
-                record(BOX), follow_inner_motion(record(BOX), None, earlier_wait).wait
-            )
+            for span in take_whole_record(record(BOX), None, earlier_wait).flights()
         ]
         assert all(0.016 <= wait <= 0.021 for wait in waits[1:])
 
@@ -92,14 +86,14 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
     with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
-        find_events(*take_whole_record(record(name), 0.002))
+        find_events(take_whole_record(record(name), 0.002))
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
     history = cut_history(record(CAR), 0.14)
-    evidence, motion = take_whole_record(history, 0.022)
-    assert find_events(evidence, motion)
-    last = evidence.flights(motion.wait)[-1]
+    evidence = take_whole_record(history, 0.022)
+    assert find_events(evidence)
+    last = evidence.flights()[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
     assert last.wait.time == 0.022
 
@@ -107,10 +101,10 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    quiet_spans = find_quiet_times(history, follow_inner_motion(history).wait)
+    quiet_spans = take_whole_record(history).flights()
     for time in history.time[[300, 640, 900]].tolist():
         early = cut_history(history, time)
-        early_spans = find_quiet_times(early, follow_inner_motion(early).wait)
+        early_spans = take_whole_record(early).flights()
         assert [span[:2] for span in early_spans] == [
             span[:2] for span in quiet_spans if span.seen <= time
         ]
@@ -118,15 +112,13 @@ def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
 
 def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3)))
-    assert take_whole_record(switched)[0].find_contact() == pytest.approx(
-        0.2858, abs=4e-4
-    )
-    assert take_whole_record(record("car_all_T02.gz"))[0].find_contact() is None
+    assert take_whole_record(switched).find_contact() == pytest.approx(0.2858, abs=4e-4)
+    assert take_whole_record(record("car_all_T02.gz")).find_contact() is None
 
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    quiet_spans = find_quiet_times(switched, follow_inner_motion(switched).wait)
+    quiet_spans = take_whole_record(switched).flights()
     assert list_spans(quiet_spans)[:2] == pytest.approx(
         np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3
     )
@@ -144,7 +136,7 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     listed = np.array(
         [flight.within(history.time) for flight in find_flights(history, Settings())]
     )
-    for flight in find_quiet_times(history, follow_inner_motion(history).wait):
+    for flight in take_whole_record(history).flights():
         flight_times = (
             flight.start,
             history.time[-1] if flight.end is None else flight.end,
@@ -159,16 +151,12 @@ def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
     rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(
         Selection(parts=("box",))
     )
-    (span,) = (
-        q
-        for q in find_quiet_times(rising, follow_inner_motion(rising).wait)
-        if q.start < 0.2
-    )
+    (span,) = (q for q in take_whole_record(rising).flights() if q.start < 0.2)
     assert span.level is not None
     assert span.level - span.start == pytest.approx(0.31, rel=0.02)
     assert all(
         q.level is None
-        for q in find_quiet_times(record(BOX), follow_inner_motion(record(BOX)).wait)
+        for q in take_whole_record(record(BOX)).flights()
         if q.start < 0.6
     )
 
@@ -216,7 +204,7 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(
 ) -> None:
     """Its first states are within the remaining force, later ones are not: the flight begins later, and continues."""
     history = make_pushed_body(round(tail, 4), round(share, 4))
-    (flight,) = find_quiet_times(history, lambda *_: Wait(wait, "given", "as given"))
+    (flight,) = take_whole_record(history, wait).flights()
     assert 0.02 <= flight.start <= 0.05
     assert flight.seen <= 0.05 + wait
     assert flight.end == pytest.approx(0.17, abs=8e-4)
@@ -231,19 +219,16 @@ def test_what_is_seen_does_not_depend_on_when_somebody_looked(
     name: str, sizes: list[int]
 ) -> None:
     history = cut_history(record(name), 0.35)
-    whole, motion = take_whole_record(history)
-    evidence, grown, begin = GrowingEvidence(), InnerMotion(), 0
+    whole, evidence, begin = take_whole_record(history), GrowingEvidence(), 0
     for size in [*sizes, history.time.size]:
         states = np.zeros(history.time.size, np.bool_)
         states[begin : begin + size] = True
         begin += size
         if not states.any():
             break
-        part = take_states(history, states)
-        evidence.take(part)
-        grown.take(part, evidence)
-        evidence.flights(grown.wait)
-    assert evidence.flights(grown.wait) == whole.flights(motion.wait)
+        evidence.take(take_states(history, states))
+        evidence.flights()
+    assert evidence.flights() == whole.flights()
     assert [witness.free for witness in evidence.witnesses] == [
         witness.free for witness in whole.witnesses
     ]
@@ -264,13 +249,15 @@ def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> No
     time = np.arange(0.0, 0.1, 5e-5)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * time / 0.02)
     energy[0] = 0.0 if jump else energy[0]
-    longest_period = require(follow_inner_motion(make_table(time, energy)).longest(0.1))
+    longest_period = require(
+        take_whole_record(make_table(time, energy)).motion.longest(0.1)
+    )
     assert longest_period.time == pytest.approx(0.02, rel=0.1)
 
 
 def test_a_swing_in_a_push_makes_no_wait_where_the_deck_tells_its_springs() -> None:
     of_deck = Wait(0.012, "deck", "of the deck", 0.01)
-    motion = take_whole_record(record(BOX), None, of_deck)[1]
+    motion = take_whole_record(record(BOX), None, of_deck).motion
     assert require(motion.longest(0.28)) == of_deck  # the body falls
     assert (
         0.016 <= require(motion.longest(0.7)).time <= 0.021

@@ -10,7 +10,7 @@ import pytest
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.names import Selection
 from d2rpick.running.events import Event
-from d2rpick.running.watch import Watch, follow
+from d2rpick.running.watch import Watch, find_files, follow
 from tests.command import ROOT
 
 LEGS = [
@@ -92,7 +92,7 @@ def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(
     for age, expected in ((50, []), (70, ["silent"]), (100, []), (150, ["silent"])):
         then = time.time() - age
         os.utime(folder / "runT01", (then, then))
-        watch._files = {name: os.stat(name) for name in watch._files}  # noqa: PTH116  written then
+        watch._files = find_files([str(folder)])  # written then
         assert list_news(watch) == expected
 
 

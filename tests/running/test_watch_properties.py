@@ -44,12 +44,12 @@ def make_pushed_history(gravity: float = 9.81) -> History:
 def list_events(
     history: History, wait: float | None = None
 ) -> list[tuple[str, float | None, float | None]]:
-    return [event[:3] for event in find_events(*take_whole_record(history, wait))]
+    return [event[:3] for event in find_events(take_whole_record(history, wait))]
 
 
 def test_a_gap_between_two_pushes_is_no_flight() -> None:
     """The gap lasts 40 ms; half of the vibration period is 60 ms."""
-    found_events = find_events(*take_whole_record(make_pushed_history()))
+    found_events = find_events(take_whole_record(make_pushed_history()))
     events = [
         event.event for event in found_events if event.event in ("flight", "contact")
     ]
@@ -90,12 +90,12 @@ def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
         if state > 20
         else make_pushed_history()
     )
-    for event in find_events(*take_whole_record(history)):
+    for event in find_events(take_whole_record(history)):
         if event.event == "switch" and event.tr is not None and event.tr > PUSHES[1][1]:
             assert not any(start <= event.tr <= end for start, end in PUSHES)
             assert history.energy_at(event.tr) >= 0.7 * 50
 
 
 def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
-    events = find_events(*take_whole_record(make_pushed_history(5.0), 0.06))
+    events = find_events(take_whole_record(make_pushed_history(5.0), 0.06))
     assert "flight" not in {event.event for event in events}

@@ -197,5 +197,5 @@ def test_the_band_of_counted_swings_is_neither_too_narrow_nor_useless() -> None:
             beside += (high > 1)[stated < 0.05].tolist()
     assert len(outside) > 200
     assert np.mean(outside) < 0.05
-    assert np.median(bounds) < 0.25
+    assert np.median(bounds) < 0.3  # 0.39 with the variation of the floor itself
     assert not any(beside)

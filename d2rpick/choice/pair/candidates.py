@@ -357,7 +357,7 @@ class Candidates(Sequence[Candidate]):
         td = situation.td
         if values["position_error"] is not None and situation.bodies:
             values |= _describe_position(situation.bodies.worst(tr, td))
-        rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
+        rigid_fraction = (td - tr) / history.duration
         parts = situation.vibration.part_matches(tr) if is_compared else ()
         notes = list[str]()
         for objection in judged.objections:
@@ -441,7 +441,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
-    first = max(start, float(situation.history.time[0]))
+    first = max(start, situation.history.start)
     printed = round_up_as_read(first)
     return Moments.of("start", [printed if printed < situation.td else first])
 

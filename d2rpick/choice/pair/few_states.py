@@ -30,7 +30,7 @@ def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
     start = situation.flight.start
     if history.energy_format not in FAMILIES or situation.at_rest:
         return
-    begin = float(history.time[0]) if start is None else start
+    begin = history.start if start is None else start
     states = history.between(begin, td)[0].size
     turns = int(np.count_nonzero((history.turns > begin) & (history.turns < td)))
     if (

@@ -52,8 +52,11 @@ _BAND: Final = 0.25
 # (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
+# Number of states in a flight at which its vibration is resolved and crossings are found within 0.5 % of the flight.
+_ENOUGH_STATES: Final = 200
 _NAMED: Final = 5  # largest number of parts that a sentence names
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
+_MORE_OFTEN: Final = "write the energies more often"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
@@ -359,11 +362,28 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     refusal = situation.evidence.refusal
     why = f": {refusal}" if refusal else ""
     unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
+    cures = [*_ask_for_more_states(situation)]
+    for_modes = _describe_cure_for_modes(situation)
+    if not cures or for_modes != _MORE_OFTEN:
+        cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{_describe_cure_for_modes(situation)}, or compare with a finished switched run",
+        f"{', '.join(cures)}, or compare with a finished switched run",
         kind=unknown,
     )
+
+
+def _ask_for_more_states(situation: Situation) -> Iterator[str]:
+    """Yield the output interval to ask for if few states lie in the flight up to td."""
+    start = situation.flight.start
+    begin = float(situation.history.time[0]) if start is None else start
+    states = situation.history.between(begin, situation.td)[0].size
+    if states < _ENOUGH_STATES and situation.td > begin:
+        interval = (situation.td - begin) / _ENOUGH_STATES
+        yield (
+            f"write the energies every {interval:.2g} or more often, because only {states} states lie in the flight "
+            "up to td"
+        )
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
@@ -375,7 +395,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also give {names} in `parts`, because {vibrates} together with the chosen parts"
-    return "write the energies more often"
+    return _MORE_OFTEN
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
@@ -417,7 +437,7 @@ def _list_causes_of_record(
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-                "write the energies more often",
+                f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
                 kind=f"the record has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )

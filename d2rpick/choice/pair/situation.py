@@ -86,7 +86,7 @@ def _find_faint_fluctuation(history: History, start: float) -> float:
     It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
     ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
     """
-    energies = history.between(start, float(history.time[-1]))[1]
+    energies = history.between(start, history.end)[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))
     highest = _find_highest_energy(history)
     quantum = history.energy_precision.quantum(float(np.abs(energies).max(initial=0.0)))
@@ -278,11 +278,7 @@ def examine_td(
     """
     _check_times(history, td, settings)
     seen = find_seen_flight(history, td)
-    # If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
-    if seen.refusal and seen.flight:
-        fitted_at = (seen.flight.start + seen.flight.end) / 2
-    else:
-        fitted_at = td
+    fitted_at = _choose_time_of_fit(seen, td)
     is_shown = seen.flight is not None or seen.refusal is not None
     span: Span | None = None
     fit: Identification | None = None
@@ -327,9 +323,19 @@ def examine_td(
         return situation
     is_flying = seen.flight is not None and not seen.refusal
     models = _find_other_models(situation, is_flying=is_flying)
-    if models:
-        return replace(situation, evidence=evidence._replace(models=models))
-    return situation
+    if not models:
+        return situation
+    return replace(situation, evidence=evidence._replace(models=models))
+
+
+def _choose_time_of_fit(seen: Seen, td: float) -> float:
+    """Return the time around which an oscillator is searched for [time].
+
+    If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
+    """
+    if seen.refusal and seen.flight:
+        return (seen.flight.start + seen.flight.end) / 2
+    return td
 
 
 def _check_times(history: History, td: float, settings: Settings) -> None:
@@ -359,8 +365,8 @@ def _find_other_models(
     history = situation.history
     td = situation.td
     flight = situation.flight
-    first = float(history.time[0])
-    last = float(history.time[-1])
+    first = history.start
+    last = history.end
     # Without evidence of the next contact, nothing is known about the time after td.
     is_described = situation.evidence.span is not None or flight.source == "oscillator"
     end = flight.end or (last if is_flying or is_described else td)
@@ -418,16 +424,14 @@ def _get_bounds(history: History, seen: Seen) -> Span:
     """Return the flight that the evidence shows, or else the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
-    return Span(float(history.time[0]), float(history.time[-1]))
+    return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
     """Return the window in which the energy shows no load, up to the end of the record if no contact is seen."""
     if quiet is None:
         return None
-    return Span(
-        quiet.start, float(history.time[-1]) if quiet.end is None else quiet.end
-    )
+    return Span(quiet.start, history.end if quiet.end is None else quiet.end)
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
@@ -465,7 +469,7 @@ def _skip_first_quarter(
     """
     if span is None or fit is None or fit.mode is None:
         return None
-    quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
+    quarter = np.pi / 2 / fit.mode.omega if span.start > history.start else 0.0
     return Described(
         min(span.start + quarter, span.end),
         span.end,

@@ -60,9 +60,11 @@ _LARGEST_EXPONENT = 700.0
 def warn_about_td(situation: Situation) -> Iterator[Caution]:
     """Yield all warnings about a situation, beginning with those about the input."""
     if not situation.history.complete:
+        end = float(situation.history.time[-1])
         yield Caution(
             "truncated-input",
-            "the input ends within a state; only complete states were used",
+            f"the input ends within a state, so times after {end:.6g} are unknown; let the run finish, "
+            "or copy the file again",
         )
     yield from _warn_about_energy(situation)
     yield from warn_about_few_states(situation)

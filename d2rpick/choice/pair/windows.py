@@ -187,7 +187,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
             ends,
         ]
     )
-    return merge_times(times[(times >= max(start, history.time[0])) & (times < td)])
+    return merge_times(times[(times >= max(start, history.start)) & (times < td)])
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:

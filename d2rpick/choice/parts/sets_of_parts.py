@@ -45,6 +45,7 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.cost import CostModel, Share, Weights
     from d2rpick.choice.question import Settings
@@ -68,7 +69,8 @@ class PartSet(NamedTuple):
     it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
     ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
     and the position error may be larger if ``position_is_lower_bound``.  ``moving`` are the parts that move relative to
-    the rest; ``apart``: some of them fly away from the body that they are to become part of.
+    the rest; ``apart``: some of them fly away from the body that they are to become part of.  ``decision`` is the
+    verdict on the window.
     """
 
     name: str
@@ -93,6 +95,7 @@ class PartSet(NamedTuple):
     apart: bool = False
     reasons: tuple[str, ...] = ()
     recommended: bool = False
+    decision: Decision | None = None
 
     @property
     def saving(self) -> float | None:
@@ -382,19 +385,21 @@ class _SetComparison:
         )
         settings = replace(self.settings, bodies=bodies, placement=self.placement)
         if isinstance(times, tuple):
-            situation = verify_run(reference, *times, settings).situation
+            verdict = verify_run(reference, *times, settings)
+            situation = verdict.situation
+            decision: Decision | None = verdict.decision
             tr, td = times
         else:
             answer = suggest_in_run(reference, times, settings, with_better=False)
             if answer.recommended is None:
                 raise RangeError(answer.why_none)
-            situation, (tr, td) = (
-                answer.situation,
-                (answer.recommended.tr, answer.recommended.td),
-            )
+            situation, decision = answer.situation, answer.decision
+            tr, td = answer.recommended.tr, answer.recommended.td
         time = reference.history.time
         part_set = part_set._replace(
-            window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0])
+            window=(tr, td),
+            rigid_fraction=(td - tr) / float(time[-1] - time[0]),
+            decision=decision,
         )
         return _add_position_error(part_set, situation, tr)
 

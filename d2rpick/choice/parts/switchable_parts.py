@@ -122,7 +122,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     longest = max(
         range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
     )
-    moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
+    moment = history.end if longest is None else sum(spans[longest]) / 2
     facts = {}
     for part, energy in zip(run.parts, energies.T, strict=True):
         in_flights = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -21,7 +22,7 @@ from d2rpick.base.errors import (
     format_in_one_line,
     list_names,
 )
-from d2rpick.choice.answers import suggest_in_run
+from d2rpick.choice.answers import decide_with_better_pair, suggest_in_run
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import EQUALLY_GOOD, grade_residual
 from d2rpick.choice.pair.windows import (
@@ -116,6 +117,7 @@ class StudyRow:
     residual: float | None = None
     basis: str | None = None
     time_unit: str = ""
+    energy_unit: str = ""
     warnings: tuple[str, ...] = ()
     td: float | None = None
     record_end: float | None = None
@@ -179,6 +181,12 @@ class StudyOfRuns:
         return sum(row.judged for row in self.runs)
 
     @property
+    def energy_unit(self) -> str:
+        """Unit of the energies; empty if the judged runs do not name the same one."""
+        units = {row.energy_unit for row in self.runs if row.judged}
+        return units.pop() if len(units) == 1 else ""
+
+    @property
     def grade(self) -> str | None:
         """Grade of the common tr: the worst grade of runs' pairs and of their errors at this tr; else None."""
         if self.common.tr is None:
@@ -215,7 +223,7 @@ def judge_run(question: Question, source: str) -> StudyRow:
     end = None
     try:
         reference = read_reference([source], question.selection, question.input_format)
-        end = float(reference.history.time[-1])
+        end = reference.history.end
         answer = suggest_in_run(
             reference, question.td, question.settings, with_better=False
         )
@@ -254,6 +262,7 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         basis=situation.basis,
         warnings=tuple(code for code in messages if code not in _NOT_REPEATED),
         time_unit=situation.history.time_unit,
+        energy_unit=situation.history.energy_unit,
         td=situation.td,
         acceptable=acceptable,
         alike=alike,
@@ -268,8 +277,13 @@ def make_row(source: str, answer: PairSuggestion) -> StudyRow:
         tr_low=best.tr_low,
         tr_high=best.tr_high,
         residual=best.residual,
-        **_list_decision_fields(answer.decision),
+        **_list_decision_fields(_decide(answer)),
     )
+
+
+def _decide(answer: PairSuggestion) -> Decision | None:
+    """Return the verdict on the pair of a run; for a given td it names the better pair that ``suggest`` names."""
+    return answer.decision if answer.td_window else decide_with_better_pair(answer)
 
 
 def _list_decision_fields(decision: Decision | None) -> dict[str, Any]:
@@ -342,8 +356,47 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     ]
 
 
+def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
+    """Return the groups of judged runs that were read from the same files, or from files with the same content."""
+    # Files are compared only if their sizes and the answers are equal, which different runs hardly ever have.
+    alike: dict[tuple[Any, ...], list[StudyRow]] = {}
+    for row in rows:
+        if row.judged and row.files:
+            sizes = tuple(stamp.size for stamp in row.files)
+            key = sizes, row.td, row.tr, row.energy_td, row.record_end
+            alike.setdefault(key, []).append(row)
+    by_content: dict[tuple[bytes, ...], list[StudyRow]] = {}
+    for group in alike.values():
+        if len(group) > 1:
+            for row in group:
+                by_content.setdefault(_digest_files(row), []).append(row)
+    return tuple(group for group in by_content.values() if len(group) > 1)
+
+
+def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
+    """Return a digest of each file of a run; of its name if the file can no longer be read."""
+    digests = []
+    for stamp in row.files:
+        try:
+            with Path(stamp.name).open("rb") as file:
+                digests.append(hashlib.file_digest(file, "sha256").digest())
+        except OSError:
+            digests.append(os.fsencode(stamp.name))
+    return tuple(digests)
+
+
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
-    """Yield warnings about omitted runs and runs of different kinds, and the warnings of single runs."""
+    """Yield warnings about repeated and omitted runs and runs of different kinds, and the warnings of single runs."""
+    repeated = find_repeated_runs(rows)
+    if repeated:
+        names = list_names([row.source for group in repeated for row in group], NAMED)
+        judged_count = sum(row.judged for row in rows)
+        different_count = judged_count - sum(len(group) - 1 for group in repeated)
+        yield Caution(
+            "repeated-runs",
+            f"the same content was given more than once ({names}), so the study rests on {different_count} of "
+            f"{format_number_of_runs(judged_count)}; give each run once",
+        )
     judged = [row for row in rows if row.judged]
     left_out = [row.source for row in rows if not row.judged]
     if left_out and judged:

@@ -240,7 +240,7 @@ def _check_number_of_states(
 ) -> None:
     """Raise RangeError if a run has too few states after td."""
     if states < 3:
-        short = min(reference, switched, key=lambda history: history.time[-1])
+        short = min(reference, switched, key=lambda history: history.end)
         name = ", ".join(short.source)
         last = float(short.time[-1])
         if last <= td:

@@ -218,7 +218,7 @@ def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
     )
     moved = float(np.abs(of_parts.values.sum(axis=1)).max())
     rigid = void or moved < _HARDLY * float(np.abs(whole.values).max())
-    return ((float(history.time[0]), float(history.time[-1])),) if rigid else ()
+    return ((history.start, history.end),) if rigid else ()
 
 
 def find_done_windows(
@@ -251,7 +251,7 @@ def _find_flight_around(
     """Return the flight with the longest overlap with a window; None if no flight overlaps it."""
 
     def shared(flight: Flight) -> float:
-        start = float(history.time[0]) if flight.start is None else flight.start
+        start = history.start if flight.start is None else flight.start
         return min(td, np.inf if flight.end is None else flight.end) - max(tr, start)
 
     best = max(flights, key=shared, default=None)

@@ -48,7 +48,7 @@ def find_longest_flight(
     if not flights and otherwise:
         return otherwise
     if not flights:
-        held = history.surroundings.held(history.parts, float(history.time[-1]))
+        held = history.surroundings.held(history.parts, history.end)
         never_falls = bool((history.energy[1:] >= history.energy[:-1]).all())
         reason = _NO_FLIGHT + (": the energy never falls" if never_falls else "")
         if held:
@@ -122,7 +122,7 @@ def _add_given_start(
 ) -> tuple[Flight, ...]:
     """Add the flight that starts at the user-given end of the load, unless a flight contains that time."""
     load_end = settings.after
-    last = float(history.time[-1])
+    last = history.end
     windows = [flight.within(history.time) for flight in flights]
     if load_end is None or any(start <= load_end < end for start, end in windows):
         return flights
@@ -192,9 +192,9 @@ def _find_flights_without_landing(
 
     look = make_look(history, settings)
     if settings.replay and not list_witnesses(history):
-        first = float(history.time[0]) if settings.after is None else settings.after
+        first = history.start if settings.after is None else settings.after
         for share in _WHERE_IT_VIBRATES:
-            flight = look(first + share * (float(history.time[-1]) - first)).flight
+            flight = look(first + share * (history.end - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
                 # This flight ends with the vibration, even if its start is given.

@@ -120,6 +120,7 @@ class RunPlan:
     """The answer of ``plan``: all flights in time order, and warnings.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
+    ``fewest_cycles`` are those of the written run, if one largest time step holds throughout, as with sensors.
     """
 
     history: History
@@ -128,6 +129,7 @@ class RunPlan:
     flights: tuple[PlannedFlight, ...]
     cautions: tuple[Caution, ...]
     done: tuple[Times, ...] = ()
+    fewest_cycles: int | None = None
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
@@ -164,7 +166,7 @@ class RunPlan:
     @property
     def rigid_fraction(self) -> float:
         """Share of the record in which the parts are rigid because of the supported windows [-]."""
-        return self.rigid_time / float(self.history.time[-1] - self.history.time[0])
+        return self.rigid_time / self.history.duration
 
     @property
     def run_time_share(self) -> float | None:
@@ -207,7 +209,7 @@ def plan_run(
     """
     history = reference.history
     refuse_unsound(history, settings)
-    span = float(history.time[-1] - history.time[0])
+    span = history.duration
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     history, done_times, cautions = prepare_switched_history(reference, done)
     reference = reference._replace(history=history)
@@ -238,7 +240,7 @@ def _list_rows(
 ) -> Iterator[PlannedFlight]:
     """Yield every flight with its window, which is planned as if it were the first window."""
     last = max((done.td for done in done_rows), default=None)
-    record = float(reference.history.time[-1] - reference.history.time[0])
+    record = reference.history.duration
     landed: float | None = None  # end of the previous flight
     for number, found_flight in enumerate(flights, start=1):
         flight = _apply_given_start(reference.history, found_flight, settings.after)

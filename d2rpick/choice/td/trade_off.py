@@ -10,10 +10,14 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.choice.answers import PairSuggestion, suggest_at, suggest_in_run
+from d2rpick.choice.answers import (
+    PairSuggestion,
+    decide_with_better_pair,
+    suggest_at,
+    suggest_in_run,
+)
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.pair.candidates import judge_candidates
-from d2rpick.choice.pair.grades import GOOD
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     list_exceeded_limits,
@@ -123,11 +127,8 @@ class Offer(AnswerAtTd):
 
     @cached_property
     def decision_with_cure(self) -> Decision | None:
-        """The verdict with the better pair named by ``suggest``, which needs a search of the peaks."""
-        decision = self.decision
-        if decision is None or decision.grade == GOOD:
-            return decision
-        return suggest_at(self.situation, ranked=self.answer.candidates).decision
+        """The verdict with the better pair that ``suggest`` names."""
+        return decide_with_better_pair(self.answer)
 
     @property
     def quality(self) -> Quality | None:
@@ -246,7 +247,7 @@ def explore_run(
     """
     history = reference.history
     refuse_unsound(history, settings, td)
-    record = float(history.time[0]), float(history.time[-1])
+    record = history.start, history.end
     window = td_window or find_longest_flight(
         history, settings, otherwise=None if td is None else record
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import product
+from pathlib import Path
 
 import pytest
 
@@ -9,7 +10,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout
 from d2rpick.histories.formats.binout import Binout, recognises
-from d2rpick.histories.opening import OpenedRun, Selection
+from d2rpick.histories.opening import OpenedRun, Selection, open_run
 from d2rpick.histories.source import Source
 from tests.made_binout import (
     GLSTAT,
@@ -150,6 +151,24 @@ def test_a_family_is_one_run() -> None:
     assert run.part_channel("x_momentum", [3])[25, 0] == compute_value(
         "x_momentum", 26, 3
     )
+
+
+def test_branches_that_the_ranks_of_an_mpp_run_write_apart_are_one_run(
+    tmp_path: Path,
+) -> None:
+    states = range(1, 21)
+    whole_only = made_binout(states, matsum_every=1000)
+    parts_only = made_binout(states, glstat=False)
+    (tmp_path / "binout0000").write_bytes(whole_only.data)
+    (tmp_path / "binout0003").write_bytes(parts_only.data)
+    run = open_run([str(tmp_path)])
+    assert run.history(Selection()).energy.tolist() == expected(
+        "internal_energy", states
+    )
+    assert [part.id for part in run.parts] == [7, 3]
+    assert run.part_energies(run.parts)[:, 0].tolist() == [
+        compute_value("internal_energy", state, 7) for state in states
+    ]
 
 
 def test_a_missing_member_of_a_family_is_noted() -> None:
