@@ -220,5 +220,7 @@ def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
         with suppress(OSError):  # The file may not exist yet, or no longer.
             status = Path(path).stat()
             if status.st_size:
-                files[path] = WatchedFile(status.st_ino, status.st_size, status.st_mtime)
+                files[path] = WatchedFile(
+                    status.st_ino, status.st_size, status.st_mtime
+                )
     return files
