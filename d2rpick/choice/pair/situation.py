@@ -309,13 +309,7 @@ def examine_td(
             modes = find_described(history, td, guess)
             described = _choose_longer_window(described, modes)
     flight = choose_flight(
-        history,
-        td,
-        seen,
-        described,
-        quiet,
-        after=settings.after,
-        landing=settings.landing,
+        history, td, seen, described, quiet, settings.after, settings.landing
     )
     evidence = Evidence(fit, span, settings.oscillator is not None, prescribed=is_given)
     situation = Situation(history, td, settings, flight, evidence)
