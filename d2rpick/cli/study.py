@@ -193,7 +193,7 @@ def _read_list(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # splitlines() is not used because names may contain other characters at which it splits.
+    # splitlines() is not used, because it also splits at characters that names may contain.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
@@ -208,7 +208,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
             raise D2RPickError(
                 f"{name}: --resume and --{option} are the same file; give two files"
             )
-    if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
+    if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116  pathlib would slow down start-up
         raise D2RPickError(
             f"{name}: --resume and standard output are the same file; send one elsewhere"
         )
