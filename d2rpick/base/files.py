@@ -233,7 +233,7 @@ def read_into(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
+    """Read bytes from an offset into ``room`` and return their number; one system call is used if possible."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)

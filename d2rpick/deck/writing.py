@@ -277,7 +277,7 @@ def _keep_bodies_off(
         node for node in find_bodies_kept_off(legs) if node not in switched_nodes
     ]
     if printed_leg.cap is None:
-        # The text of a leg without time-step limit ends with an /RBODY/OFF card; these lines are appended to that card.
+        # An engine run without time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
         return write_numbers(off_nodes)
     return write_bodies_off(off_nodes)
 

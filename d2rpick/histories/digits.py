@@ -41,7 +41,7 @@ _FIRST_STATES: Final = 10
 
 
 def round_as_read(time: float) -> float:
-    """Return the time that a user types who has read this time with six digits.
+    """Return the time that a user types after reading this time with six digits.
 
     Examples
     --------

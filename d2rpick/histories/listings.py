@@ -94,7 +94,7 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended according to the listing of its last history; None if it is unknown.
+    """Return how a run ended, according to the listing of its last history; None if it is unknown.
 
     A leg that was told to stop has not ended the run, nor has a leg with a next leg.
     """
@@ -150,7 +150,7 @@ def _detect_old_engine(head: bytes, tail: bytes) -> str:
 
 
 class Timing(NamedTuple):
-    """Number of cycles of a leg, and the CPU times of the whole leg and of its elements [s]."""
+    """Number of cycles of a restart segment, and the CPU times of the whole segment and of its elements [s]."""
 
     name: str
     cycles: int

@@ -53,7 +53,7 @@ _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)
 _SOURCE: Final = re.compile(r"t\d\d")
 # Names of datasets whose group names the quantity, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-# Names of datasets next to the values that contain no quantity.
+# Names of datasets that lie next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
@@ -71,7 +71,7 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-# Normalised name of the rotational energy, which Radioss writes separately from the kinetic energy.
+# Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
 ROTATION_ENERGY: Final = "rotationenergy"
 # Pattern of other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (

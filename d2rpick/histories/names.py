@@ -1,4 +1,4 @@
-"""Interpret the names of columns, units and parts, and find those that the user selects."""
+"""Interpret the names of columns, units and parts, and find the names that the user selects."""
 
 from __future__ import annotations
 

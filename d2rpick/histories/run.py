@@ -151,7 +151,7 @@ class OpenedRun:
     def momenta(
         self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
     ) -> tuple[Momenta, ...]:
-        """Return the momenta of the parts and of the whole model, as far as they are written.
+        """Return the momenta of the parts and of the whole model, if the files contain them.
 
         ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
         """
@@ -302,7 +302,7 @@ class OpenedRun:
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if not written."""
+        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if they are missing."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
@@ -376,7 +376,7 @@ class OpenedRun:
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        # The condition is true if only springs have energy.
+        # Only springs have energy.
         if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Smallest share of states that repeat the previous time in a table with a row for each part.
 _REPEATED: Final = 0.49
-# Smallest number of times; with fewer times, equal times in several rows may be a coincidence.
+# Smallest number of times that is examined; with fewer, equal times in several rows may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of output intervals before and after a restart; other curves and unsorted tables exceed it.
 _ALIKE = 2.0

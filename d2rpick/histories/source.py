@@ -35,7 +35,7 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
 
-# Pattern of a file name with the number of its leg: runT01, binout0001; the first leg may have no number.
+# Pattern of a file name with the number of its restart segment (runT01, binout0001), if there is one.
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
@@ -382,7 +382,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its leg; without a number the leg is 0."""
+    """Split a file name into its stem and the number of its restart segment, which is 0 without a number."""
     match = _NUMBERED.fullmatch(name)
     # the match is never None, because the pattern matches any text
     assert match is not None

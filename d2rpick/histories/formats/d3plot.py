@@ -67,7 +67,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each family of files as a leg of the run; a family starts with a file that has a header."""
+    """Open each family of files as a restart segment of the run; its first file has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")

@@ -70,7 +70,7 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Read this number of counts from the file; raise FormatError if one of them is negative."""
+        """Read ``count`` integers from the file, and advance; raise FormatError if one of them is negative."""
         counts = self._words.integers(self.at, count)
         if min(counts) < 0:
             raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")

@@ -424,7 +424,7 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return what `_alike` returns, for the blocks of one sequence, which have one example."""
+        """Return True if all blocks of one sequence equal their example, as `_alike` does for all sequences."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)

@@ -59,7 +59,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run; an incomplete last state must have the selected lines."""
+    """Open each file as a restart segment of the run; an incomplete last state must have the selected lines."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources

@@ -69,7 +69,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a leg of the run. Selected columns take precedence over the branches of a saved binout."""
+    """Open each file as a restart segment. Selected columns take precedence over branches of a saved binout."""
     return [_open_leg(source, selection) for source in sources]
 
 

@@ -229,7 +229,7 @@ def _find_rows(
             counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            # If no row has a last cell, every row ends with a separator.
+            # If the last cell of every row is empty, every row ends with a separator.
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
             if columns > 1 and count > best_count:

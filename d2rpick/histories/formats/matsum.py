@@ -85,7 +85,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
-    """Open each file as a leg of the run."""
+    """Open each file as a restart segment of the run."""
     return [Matsum(source.data, source.name) for source in sources]
 
 
