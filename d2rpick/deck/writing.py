@@ -55,7 +55,7 @@ _ONCE = {
     "END",
 }
 
-# an engine run writes its restart file only at its end
+# An engine run writes its restart file only at its end
 _NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 

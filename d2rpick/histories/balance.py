@@ -238,7 +238,7 @@ class _Columns:
         return None
 
     def _values(self, name: str) -> Samples | None:
-        """Return a column with finite numbers in all states, or None."""
+        """Return a column; None if it is missing, or not all of its values are finite."""
         values = give_if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None

@@ -185,7 +185,7 @@ class OnDisk(Content):
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Return an array of ``size`` bytes; small arrays share a buffer, since new memory costs more than reading."""
+        """Return an array of ``size`` bytes; small arrays share a buffer, as new memory costs more than reading."""
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -290,7 +290,7 @@ class Scattered(OnDisk):
         self._digest = ""
 
     @cached_property
-    def _own(self) -> local:  # type: ignore[override]
+    def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
         """The window of each thread; it is created at its first use, because most files need no window."""
         from threading import local
 

@@ -116,7 +116,7 @@ class Database:
         return {}
 
     def branch(self, name: str) -> Database:
-        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError if missing."""
+        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError without it."""
         reason = self.no_channels if name == "glstat" else self.no_parts
         raise FormatError(f"{self.source}: {reason}")
 
@@ -159,7 +159,7 @@ class Database:
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
-        """Return the precision of the times and of these channels, or of the parts without channels."""
+        """Return the precision of the times and of these channels; without channels, that of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 
@@ -289,7 +289,7 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of the given parts; energies are kept read-only, since requests repeat."""
+        """Return a quantity of the given parts; energies are kept, because they are requested repeatedly."""
         if (
             quantity == "internal_energy"
             and self._energies

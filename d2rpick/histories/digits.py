@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-_DIGITS: Final = 6  # significant digits of a printed time
+_DIGITS: Final = 6  # number of significant digits of a printed time
 # Number of significant digits kept in a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 

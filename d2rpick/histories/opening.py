@@ -248,7 +248,7 @@ def _sort_forces_last(
     """Return the formats; formats that contain only forces come last. Raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # reading the branch raises the error with the best message about missing data
+        # Reading the branch raises the error with the best message about missing data
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 

@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column other than times, or the only column named like an internal energy."""
+    """Return the only numeric column other than times, or the only column whose name means an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)

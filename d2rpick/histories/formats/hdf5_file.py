@@ -337,7 +337,7 @@ def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Col
 def _find_only_energy(
     columns: Sequence[Column], time: Column | None, source: str
 ) -> Column:
-    """Return the only column named like an internal energy, or the only one next to a time."""
+    """Return the only column whose name means an internal energy, or the only column besides a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:
