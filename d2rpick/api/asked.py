@@ -218,7 +218,6 @@ def complete_selection(
     """
     from d2rpick.choice.parts.deck_of_run import check_model_of_deck
     from d2rpick.choice.parts.sets_of_parts import recommend_parts
-    from d2rpick.deck.model import DISCRETE
 
     if foreign := check_model_of_deck(run, model.inventory):
         if has_recommended(selection.parts, run.parts):
@@ -226,10 +225,7 @@ def complete_selection(
                 f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
             )
         return selection
-    counts = model.inventory.counts
-    springs = {part.id for part in run.springs} | {
-        part for part, kinds in counts.items() if {*kinds} <= DISCRETE
-    }
+    springs = {part.id for part in run.springs} | model.inventory.springs
     parts = selection.parts
     if has_recommended(parts, run.parts):
         parts = tuple(map(str, recommend_parts(run, settings, model)))

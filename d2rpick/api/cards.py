@@ -110,7 +110,7 @@ class Cards:
         pair=True,
     )
     step_cap: float | None = make_option(
-        "Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT"
+        "Largest time step while the parts are rigid (DTMAX, /DTIX).", POSITIVE, "DT"
     )
     node: tuple[str, ...] = make_option(
         "Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True

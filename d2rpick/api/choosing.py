@@ -40,10 +40,10 @@ class Choosing(JudgingOptions, total=False):
     ``fit_window``: window of time in which the oscillator is identified.  ``strict``: recommend nothing if only the
     energy shows when the load ends (default: False).  ``keep_vibration``: grade the vibration by the residual alone,
     even if the next contact has far more energy (default: False).  ``cost_share``: share of the cost of a time step
-    that the elements of the switched parts take, to predict the CPU time.  ``step_ratio``: ratio of the time step
-    while rigid to the one before, 1 or more (default: 1).  ``oscillator``: given instead of identified, with ``v0``.
-    ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy level alone,
-    without an oscillator (default: True).
+    that the elements of the switched parts take, to predict the CPU time.  ``step_ratio``: time step while the parts
+    are rigid, divided by the time step before, 1 or more (default: 1).  ``oscillator``: given instead of identified,
+    with ``v0``.  ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy
+    level alone, without an oscillator (default: True).
     """
 
     fit_window: tuple[float | str, float | str] | None

@@ -427,6 +427,13 @@ class Inventory:
         mask = self._mask(body if springs else ())
         return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
+    @property
+    def springs(self) -> frozenset[int]:
+        """Parts that have only springs and the like."""
+        return frozenset(
+            part for part, kinds in self.counts.items() if {*kinds} <= DISCRETE
+        )
+
     def _discrete(self, part: int) -> bool:
         """Return True if a part consists of springs. Springs form no rigid body, but move with one."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE

@@ -273,10 +273,9 @@ class History:
     raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
     energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
     energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
-    ends within a state; ``notes`` are for the user; ``files`` were read. If the energy is a sum, ``part_names`` (k,)
-    and ``part_energies`` (n, k) are its terms that are not always zero. ``time_unit`` and ``energy_unit`` are empty
-    unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a file is read at the first
-    request. ``surroundings`` are the forces from outside.
+    ends within a state; ``notes`` are for the user; ``files`` were read. ``time_unit`` and
+    ``energy_unit`` are empty unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a
+    file is read at the first request. ``surroundings`` are the forces from outside.
     """
 
     time: Samples
@@ -290,8 +289,6 @@ class History:
     energy_precision: Precision = EXACT
     time_unit: str = ""
     energy_unit: str = ""
-    part_names: tuple[str, ...] = ()
-    part_energies: Samples | None = None
     evidence: Given = NO_EVIDENCE
     surroundings: Surroundings = UNKNOWN
     complete: bool = True
@@ -319,15 +316,6 @@ class History:
             raise HistoryError(
                 f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}"
             )
-        if self.part_energies is not None:
-            terms = freeze(self.part_energies)
-            expected = (time.size, len(self.part_names))
-            if terms.shape != expected:
-                raise HistoryError(
-                    f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
-                    f"{expected} was expected"
-                )
-            object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
 

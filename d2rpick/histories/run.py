@@ -399,9 +399,7 @@ class OpenedRun:
         history = self._history_of(
             holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen
         )
-        return _add_terms(
-            replace(history, springs=tuple(compress(chosen, left_out))), names, energies
-        )
+        return replace(history, springs=tuple(compress(chosen, left_out)))
 
     def _without_springs(self, database: Legs, channel: str) -> History:
         """Return the history of the whole model without the energy of springs and dampers, if there is other energy."""
@@ -447,12 +445,9 @@ class OpenedRun:
         channel = " + ".join(names)
         notes = note_other_quantity(channel)
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
-        history = self._history_of(
+        return self._history_of(
             database, database.time, energy, channel, names, notes, None
         )
-        if len(columns) == 1:
-            return history
-        return _add_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Return the database that has all these channels, and their names in it."""
@@ -574,15 +569,3 @@ def _compute_median_of_nonzero(values: Samples) -> Samples:
 def _note_left_out_springs(springs: str) -> str:
     """Return the note on the energy of springs that is left out."""
     return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"
-
-
-def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms (n, k) of an energy that are not always zero; a single term is returned unchanged."""
-    active = np.flatnonzero(energies.any(axis=0))
-    if active.size < 2:
-        return history
-    return replace(
-        history,
-        part_names=tuple(names[i] for i in active.tolist()),
-        part_energies=energies[:, active],
-    )

@@ -97,12 +97,8 @@ class GrowingRecord:
 
 
 def _list_tables(history: History) -> list[Table]:
-    """Return the history itself, each of its momenta, and its balance if there is one.
-
-    The energies of single parts, many numbers that are not needed here, are left out.
-    """
-    tables: list[Table] = [replace(history, part_energies=None, part_names=())]
-    tables += history.momenta
+    """Return the history itself, each of its momenta, and its balance if there is one."""
+    tables: list[Table] = [history, *history.momenta]
     if history.balance:
         tables.append(history.balance)
     return tables

@@ -267,13 +267,11 @@ class Lsda:
             else:
                 records.append(near[at : at + head])
             position = end
-        if position < size and not self._goes_on(
-            data[position : position + head], heads
-        ):
-            records = records[:-1]
-        self._leave(directory, records)
         if position < size:
             self.stop = f"no complete record at byte {position} of {size}"
+            if not self._goes_on(data[position : position + head], heads):
+                records = records[:-1]
+        self._leave(directory, records)
         if directory.is_state and (self.stop or command == VARIABLE):
             self.unfinished = directory.branch
 
