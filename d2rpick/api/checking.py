@@ -164,7 +164,7 @@ def find_findings(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check the named decks, by a run if there is one."""
+    """Check the named decks, with the history of a run if one is given."""
     judge = None
     if run is None:
         request.without_history()

@@ -341,7 +341,7 @@ def add_checksum(text: str) -> str:
 
 
 def parse_record(line: bytes) -> dict[str, Any] | None:
-    """Return the record of a signed line; None if the line is damaged."""
+    """Return the record in a line with a checksum; None if the line is damaged."""
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
     if checksum != f'{_compute_checksum(body)}"}}'.encode():
         return None

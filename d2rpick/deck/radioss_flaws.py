@@ -124,7 +124,7 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
         for flaw in _check_wall(wall, starter, groups, bodies)
     ]
     flaws += [*_check_starts(run, groups, bodies)]
-    # Otherwise an include file that was not read may contain a velocity.
+    # If an include file was not read, it may contain a velocity.
     if not run.deck.unread:
         flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))

@@ -387,7 +387,7 @@ def count_line_number(data: Content, address: int) -> int:
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each offset, shape (n, width)."""
-    # This overlapping view has a field at every offset, so that fields can be selected by index.
+    # The overlapping view has a field at every offset, so that fields can be selected by index.
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

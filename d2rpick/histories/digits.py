@@ -36,7 +36,7 @@ _NEVER_MEANT: Final = 0.01
 # A time converted to a smaller unit must lie beyond this first share of the record to be suggested.
 _HARDLY_MEANT: Final = 0.05
 # A td among this number of first states is assumed to have another unit, because it would hardly save time.
-# Both such a td and 1000 times its value lie in the record only if the record has 1000 states or more.
+# A td and 1000 times this td both lie in the record only if the record has 1000 states or more.
 _FIRST_STATES: Final = 10
 
 

@@ -24,8 +24,8 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match, from the best to the worst.
-# They depend on the words that a name contains in addition to the quantity.
+# Ranks of a match between a name and a quantity, from the best to the worst.
+# The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -118,7 +118,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # This is not a path but a name with a slash, such as "total energy / initial energy".
+    # The name is not a path but contains a slash, such as "total energy / initial energy".
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -309,7 +309,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    # This term is contained in the kinetic energy.
+    # The rotational energy is contained in the kinetic energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)

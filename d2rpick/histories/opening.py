@@ -116,7 +116,7 @@ def open_sources(
     input_format: str = "auto",
     notes_on_names: tuple[str, ...] = (),
 ) -> OpenedRun:
-    """Open the files of one run from their bytes; arguments and errors as in `open_run`.
+    """Open the files of one run from their bytes; arguments and errors are those of `open_run`.
 
     ``notes_on_names`` are about the names by which the files were found.
     """

@@ -356,7 +356,7 @@ class OpenedRun:
         """Return the database with parts; if there is none, raise a FormatError that names what the files contain."""
         holder = self._with_parts()
         if holder is None:
-            # This database raises the error with the best message about missing parts.
+            # The first database raises the error with the best message about missing parts.
             self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
@@ -455,7 +455,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # This database raises the error with the best message about missing channels.
+                    # A database without channels raises the error with the best message about missing channels.
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:

@@ -102,7 +102,7 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        # This version of the airbag data has a word for the number of chambers.
+        # Version 4 of the airbag data has a word for the number of chambers.
         self.at += version == 4
         # Each value has a type and a name.
         self.at += 9 * (of_geometry + of_particle + of_airbag)

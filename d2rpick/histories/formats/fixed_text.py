@@ -94,7 +94,7 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # This becomes True when a request has compared a part of each block.
+        # True after a request has compared a part of each block.
         self._trusted = False
         # Bits that vary between the blocks of a long sequence of equal blocks, by the start of the sequence.
         self._varied: dict[int, Bytes] = {}

@@ -95,7 +95,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # This becomes False if a state lacks a line that other states have.
+        # False if a state lacks a line that other states have.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]

@@ -87,7 +87,7 @@ def _open_leg(source: Source, selection: Selection) -> Database:
 
 
 def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; {} for a file of another layout."""
+    """Open the glstat and matsum branches that lasso-python saved; return {} for a file of another layout."""
     with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)

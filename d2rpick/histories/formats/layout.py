@@ -244,7 +244,7 @@ def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
     """Return for each cell of a row if it is a number or missing; an empty tuple if the line is not a row."""
-    # This is usual, because most separators that are tried are wrong.
+    # Most lines have only one cell, because most separators that are tried are wrong.
     if len(cells) < 2:
         return ()
     written = [form.number(cell) is not None for cell in cells]
