@@ -278,7 +278,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # Empty for Radioss, because this factor exists in LS-DYNA decks only.
+        ]  # The list is empty for Radioss, because only LS-DYNA decks scale ENDTIM.
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
