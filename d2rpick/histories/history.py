@@ -324,6 +324,13 @@ class History:
         """Momenta of the parts, and then of the whole model, if they are known."""
         return self.evidence.momenta
 
+    def find_momenta(self, *, of_parts: bool) -> Momenta | None:
+        """Return the momenta of the parts, or of the whole model; None if they are not written."""
+        for momenta in self.momenta:
+            if (momenta.parts is not None) is of_parts:
+                return momenta
+        return None
+
     @property
     def masses(self) -> Samples | None:
         """Masses of the parts whose momenta are known; an unknown mass is NaN, and None means no known mass [mass]."""
