@@ -257,7 +257,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """The fit without one part: the rotation of the others, the unexplained sum, and how far the part displaces them."""
+    """The fit without one part: the rotation of the others, their unexplained sum, and how far the part moves them."""
 
     part: int
     rate: Samples
