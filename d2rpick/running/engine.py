@@ -309,7 +309,7 @@ class Solver:
                 path.unlink()
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for leg ``number``; ``share`` of the run remains to be computed."""
+        """Raise D2RPickError if the disk has no room for leg ``number``; ``share`` of the run remains to compute."""
         written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
         to_come = round(written * share / max(1 - share, 0.1))
         needed = 2 * self._measure_largest_restart() + to_come
