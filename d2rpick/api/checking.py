@@ -126,7 +126,7 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.asked import make_request  # imported here to start faster
+    from d2rpick.api.asked import make_request  # Imported here to keep start-up fast.
 
     names = arguments.list_paths("decks", decks)
     if history is not None:
@@ -169,9 +169,8 @@ def find_findings(
     if run is None:
         request.without_history()
     else:
-        from d2rpick.rules.judgement import (
-            HistoryJudge,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.rules.judgement import HistoryJudge
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
@@ -209,11 +208,10 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result of each deck once, of a run under its first file. A folder stands for its main decks."""
+    """Yield the result of each deck once, and of a run under its first file. A folder stands for its main decks."""
     visited: set[str] = set()
-    real_folder = cache(
-        os.path.realpath
-    )  # cached, because it asks the system for each parent folder
+    # The result is cached, because it asks the system for each parent folder.
+    real_folder = cache(os.path.realpath)
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
     )
@@ -251,9 +249,9 @@ def _check_each(
 
 
 def _list_decks(name: str) -> list[str] | DeckError:
-    """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
+    """Return the main decks in a folder, or the deck itself; return an error for a folder without decks."""
     try:
-        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path fails on odd names
+        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path.is_dir fails on some names
     except DeckError as error:
         return error
 
@@ -281,7 +279,7 @@ def _check_one(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the configuration nearest to it; return an error in either, so that other decks are checked."""
+    """Check a deck by the configuration nearest to it. An error is returned, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)
@@ -295,5 +293,5 @@ def _check_one(
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # the error concerns the history, with which all decks are judged
+            raise  # The error concerns the history, by which all decks are judged.
         return Unreadable(name, error, (source,))

@@ -36,28 +36,28 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest share of the states at which a time may step back. A restart steps back once; other columns do so often.
+# Largest share of the states at which a time may step back. Other columns step back more often than a restart.
 _MOST_BACK: Final = 0.1
 # Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# Output has a gap if an interval is this many times the median interval.
+# An interval between states is a gap in the output if it is this many times the median interval.
 _LONG = 30.0
-# Number of states whose time steps are compared at once, so that they fit into the cache.
+# Number of states whose time steps are compared at once, so that they fit into the processor's cache.
 _PIECE: Final = 1 << 15
-# Databases may belong to one run if this share of the states of the coarser one is at times of the other one.
-# Output intervals may differ, but a solver writes at its own cycles.
+# Smallest share of the times of the coarser database that the other database of the same run also has.
+# A solver writes all databases of a run at its own cycles, even if their output intervals differ.
 _FEWEST = 0.5
-# End times of databases of one run may differ by this number of output intervals: a killed run lacks some states.
+# Largest difference of the end times of databases of one run [output intervals]; a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerances for an internal energy of the parts above the energy of the model.
-# _MORE is relative to the largest energy of the model; in solver files the parts exceed it by less than 0.1 %.
+# Tolerances by which the internal energy of the parts may exceed the energy of the model.
+# _MORE is relative to the largest energy of the model; solver files need less than 0.1 %.
 # _ROUND_OFF is relative to the largest kinetic energy.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one leg of a run, in the units of the run; each reader defines the contents.
+    """The states of one leg of a run, in the units of the run; each reader defines what they contain.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -108,7 +108,7 @@ class Database:
 
     @property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of contacts and rigid walls; raises FormatError if they are written but cannot be read."""
+        """Forces of contacts and rigid walls; raises FormatError if the files have forces that cannot be read."""
         return ()
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
@@ -138,7 +138,7 @@ class Database:
         """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
-    def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002
+    def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
         """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
         raise FormatError(f"{self.source}: displacements of nodes are not read from it")
 
@@ -155,10 +155,10 @@ class Database:
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy that the name of a column contains; empty without one."""
+        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
         return find_energy_unit(channel)
 
-    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
         """Return the precision of the times and of these channels, or of the parts without channels."""
         return Precision(self.digits), Precision(self.digits)
 
@@ -181,11 +181,11 @@ class Legs:
         self._own_notes = notes  # notes on files that were not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # the times of a single leg may not be known yet
+        if len(legs) > 1:  # The times of a single leg may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
-        # ids and energies of the parts of the last request
+        # Part ids and energies of the most recent request.
         self._energies: tuple[tuple[int, ...], Samples] | None = None
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
@@ -208,7 +208,7 @@ class Legs:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Columns that all legs have."""
+        """Columns of the whole model that all legs have."""
         common = set(self._legs[0].channels)
         for leg in self._legs[1:]:
             common.intersection_update(leg.channels)
@@ -228,7 +228,7 @@ class Legs:
             elif len(names) == 1:
                 channels[quantity] = names[0]
         for quantity, name in self._named:
-            # another database of the run may have the quantity; if none has it, `open_run` raises the error
+            # Another database of the run may have the quantity; if none has it, `open_run` raises the error.
             with suppress(FormatError):
                 channels[quantity] = self.find(name)
         return channels
@@ -243,7 +243,7 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and on what was left out between them."""
-        # read first, because reading the columns may add notes to the legs
+        # The columns are read first, because reading them may add notes to the legs.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -281,7 +281,7 @@ class Legs:
         return self._legs[0].find(wanted)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy that the name of a column contains."""
+        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
         return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
@@ -320,7 +320,7 @@ class Legs:
         )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the leg with the coarsest numbers."""
+        """Return the precisions of the leg whose numbers have the fewest digits."""
         precisions = [leg.precisions(names) for leg in self._legs]
         coarsest_time = min((time for time, _ in precisions), key=_count_digits)
         coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
@@ -379,7 +379,7 @@ class Legs:
         return keep, (*notes, *unused, *_note_holes(valid_times))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
-        """Join the columns of the legs, without the states that are not valid."""
+        """Join the columns of the legs, and remove the invalid states."""
         whole = _join_columns(columns)
         return whole if keep.all() else whole[keep]
 
@@ -411,12 +411,12 @@ def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the number of decimals of a precision, or else its number of digits."""
+    """Return the number of decimals of a precision; if there is none, its number of significant digits."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, where a leg may be missing."""
+    """Return notes on long intervals without output; a leg may be missing there."""
     if time.size < 4:
         return ()
     pieces = (
@@ -426,7 +426,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    # the usual case, regular output intervals
+    # Output intervals are usually regular, so that no gap has to be searched for.
     if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)
@@ -445,7 +445,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     try:
         if whole is holder or whole.energy_channel is None:
             return
-    except FormatError:  # an ambiguous energy is reported when it is read
+    except FormatError:  # An ambiguous energy is reported when it is read.
         return
     in_parts, in_model = _find_coincident(
         holder.part_time,
@@ -498,7 +498,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
+    """Return the indices of the times within ``room`` [time] of another time, and the indices of these other times.
 
     Examples
     --------

@@ -63,9 +63,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Choose a td in a flight. If the evidence is wrong, give --after and --landing.",
         ),
         "rotation-unknown": Explanation(
-            "Neither the parts nor the motion of nodes shows how the body rotates in the flight. With the deck, the "
-            "margin before the next contact is the one for the worst rotation that the kinetic energy allows. Without "
-            "the deck, the margin may be too short.",
+            "Neither the parts nor the motion of nodes shows how the body rotates in the flight. If you give the "
+            "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
+            "contact may be large. Without the deck, the margin may be too short.",
             "Give the deck with --deck. In a Radioss run, also write the motion of at least three nodes of the body "
             "that do not lie on a line (/TH/NODE). For other solvers, set the margin with --margin.",
         ),

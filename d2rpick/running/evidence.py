@@ -59,7 +59,6 @@ class GrowingEvidence:
         # For each state, True if the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
         self._largest_momentum = 0.0
-        # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
         self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
     @property

@@ -374,14 +374,14 @@ class ModalVibration:
         )
         deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # Both show how accurate the lines are: the scatter of the fit, and the fit to the first part of the record.
-        of_lines = np.maximum(deviation, lines)
+        of_lines = np.minimum(np.maximum(deviation, lines), np.maximum(squared, 1.0))
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
+        of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
         off = np.asarray(
             _LEAST_HALF
-            + _compute_effect_of_deformation(_NOT_LINEAR, squared)
+            # These do not depend on each other.
+            + np.sqrt(of_lines**2 + of_rest**2 + of_structure**2)
             + min(self._wrong, 1.0) * (1 + np.abs(squared - 1))
-            + np.minimum(of_lines, np.maximum(squared, 1.0))
-            + of_rest
             + self._phase_share * squared
             + _compute_effect_of_deformation(
                 np.sqrt(_SWINGING_COUNTS * self.swinging / level), squared

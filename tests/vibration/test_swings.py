@@ -152,3 +152,50 @@ def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
     fit = identify(time, record.energy)._replace(hidden_share=hidden)
     evidence = Evidence(fit, Span(0.0, 6.0), models={"swings": Told(**vars(counted))})
     assert model_at(find_energy_at(record, 4.1, evidence), evidence).basis == basis
+
+
+def make_two_planes(
+    rng: np.random.Generator,
+) -> tuple[Samples, Samples, Samples]:
+    """Return the deformations of two planes [sqrt(energy)], shape (2, n), their velocities, and a drift."""
+    rates = np.array([1.0, rng.uniform(1.1, 4.0)])
+    sizes = np.sqrt([1.0, np.exp(rng.uniform(np.log(1e-4), np.log(0.3)))])
+    damping = rng.uniform(0.0, 0.04)
+    phases = np.outer(rates, TIME) + rng.uniform(0, 2 * np.pi, (2, 1))
+    waves = sizes[:, np.newaxis] * np.exp(-damping / 2 * TIME + 1j * phases)
+    drift = rng.choice([0.0, rng.uniform(-0.2, 0.2)]) * TIME / TIME[-1]
+    return waves.real, waves.imag, drift
+
+
+def test_the_band_of_counted_swings_is_neither_too_narrow_nor_useless() -> None:
+    """A residual of almost nothing once stood beside an upper bound of 1 to 2, where most true ones were below 0.2."""
+    rng = np.random.default_rng(1)
+    outside, bounds, beside = [], [], []
+    for _ in range(60):
+        planes, speeds, drift = make_two_planes(rng)
+        swings = count_swings(TIME, np.sum(planes**2, axis=0) + 1 + drift)
+        if swings is None:
+            continue
+        for at in (700, 900, 1100):
+            td = float(TIME[at])
+            profile = swings.profile(td)
+            tr = np.array([time for time in profile.minima() if time < 0.75 * td])
+            if not tr.size:
+                continue
+            expected = np.sqrt(
+                (swings.separation(tr, td) + swings.kinetic_energy(td))
+                / swings.vibration_energy(td)
+            )
+            stated, low, high = swings.residual_band(expected, tr, td)
+            at_tr = np.array([np.interp(tr, TIME, plane) for plane in planes])
+            lost = np.sum((at_tr.T - planes[:, at]) ** 2, axis=1)
+            energy = np.sum(planes[:, at] ** 2 + speeds[:, at] ** 2)
+            true = np.sqrt((lost + np.sum(speeds[:, at] ** 2)) / energy)
+            assert np.all((low <= stated) & (stated <= high))
+            outside += ((true > high + 1e-3) | (true < low - 1e-3)).tolist()
+            bounds += (high - expected)[expected < 0.3].tolist()
+            beside += (high > 1)[stated < 0.05].tolist()
+    assert len(outside) > 200
+    assert np.mean(outside) < 0.05
+    assert np.median(bounds) < 0.3  # 0.39 with the variation of the floor itself
+    assert not any(beside)

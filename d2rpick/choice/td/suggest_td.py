@@ -432,7 +432,7 @@ def _choose_by_modes(
 
     The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
     more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
-    window, it is the longest of those whose residual the band of the best leaves open.
+    window, it is the longest of the long ones whose residual the band of the best of them leaves open.
     """
     compared = situation.vibration.compared
     start = situation.earliest_tr
@@ -451,8 +451,12 @@ def _choose_by_modes(
             return _find_best_of_long(long)[0].td, _get_td(_find_longest(pairs))
     if not pairs:
         return _choose_by_residual(situation, window, look)
-    alike = good or _select_within_band(pairs)
-    return _get_td(_find_longest(alike)), _get_td(_find_longest(pairs))
+    if good:
+        return _get_td(_find_longest(good)), _get_td(_find_longest(pairs))
+    least_time = _LEAST_RIGID[0] * (last - first)
+    long = [pair for pair in pairs if pair[1].rigid_time >= least_time] or pairs
+    alike = _find_longest(_select_within_band(long))
+    return _get_td(alike), _get_td(_find_longest(pairs))
 
 
 def _is_good(pair: Pair) -> bool:

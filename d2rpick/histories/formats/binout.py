@@ -36,10 +36,10 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg, because a solver continues and distributes a binout in one folder."""
+    """Open the files of each folder as one leg, because a solver writes all files of a binout to one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
-        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  starts faster
+        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
         folders.setdefault(folder, []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
 
@@ -83,8 +83,8 @@ class Binout(Database):
         self.channels = tuple(name for name in whole.scalars if name != "time")
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]
-        """The parts of matsum, in the order of the first list of ids."""
+    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # a property overrides a field
+        """The parts of the matsum branch, in the order of its first list of ids."""
         _, branch = self._branches
         return tuple(
             Part(number, branch.legend.get(number, "")) for number in branch.part_ids
@@ -92,7 +92,7 @@ class Binout(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts, with both sides combined, and of the rigid walls."""
+        """Forces of the contacts (one force for both sides), and of the rigid walls."""
         return read_binout_forces(self._files)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:

@@ -1,4 +1,4 @@
-"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, usually written far more often."""
+"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, with a shorter output interval."""
 
 from __future__ import annotations
 
