@@ -333,7 +333,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     if kind == "flag":
         return check_flag(name, value, default)
     if option.many:
-        return list_part_names(name, value)  # type: ignore[arg-type]
+        return list_part_names(name, value)  # type: ignore[arg-type]  # the function checks the type
     if option.pair and isinstance(kind, range):
         return check_two_whole_numbers(name, value, kind.start)
     if option.pair:

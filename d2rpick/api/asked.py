@@ -164,7 +164,7 @@ def ask_run(
     if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # This raises an error if both an energy and parts are named.
+        request.selection()  # The call raises an error if both an energy and parts are named.
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:

@@ -164,7 +164,7 @@ def find_findings(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check the named decks, by a run if there is one."""
+    """Check the named decks, with the history of a run if one is given."""
     judge = None
     if run is None:
         request.without_history()
@@ -213,7 +213,7 @@ def _check_each(
     # The result is cached, because it asks the system for each parent folder.
     real_folder = cache(os.path.realpath)
     configured = cache(
-        lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
+        lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118  pathlib is slow for many decks
     )
     found_by_name = {name: _list_decks(name) for name in dict.fromkeys(deck_names)}
     listed = [
@@ -231,8 +231,8 @@ def _check_each(
             folder, file = os.path.split(deck)
             real = (
                 os.path.realpath(deck)
-                if os.path.islink(deck)  # noqa: PTH114
-                else os.path.join(real_folder(folder), file)  # noqa: PTH118
+                if os.path.islink(deck)  # noqa: PTH114  pathlib is slow for many decks
+                else os.path.join(real_folder(folder), file)  # noqa: PTH118  pathlib is slow for many decks
             )
             if real not in visited and not any(
                 deck in legs for legs in restarts.values()
@@ -261,11 +261,11 @@ def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
-        folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
+        folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120  pathlib is slow for many decks
         neighbours = [
             deck
             for deck in decks
-            if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
+            if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120  pathlib is slow for many decks
         ]
         if len(neighbours) == 1 and not list_run_files(neighbours[0]):
             legs.setdefault(neighbours[0], []).append(restart)

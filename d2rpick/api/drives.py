@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.running.sequence import Leg
 
-# Shortest time between td and a contact for which parts are released [s].
+# Shortest time between td and the next contact [s].
 _SHORTEST = 2e-3
 # Assumed cost of a cycle with rigid parts relative to a cycle without, if the deck does not determine it.
 _UNKNOWN = 0.5

@@ -347,7 +347,7 @@ def write_planned_deck(
     from d2rpick.rules.judgement import HistoryJudge
 
     question = plan.question
-    # Only windows with the times on the card are in the deck.
+    # The copy of the deck contains only the windows whose times are on the card.
     done = card.card.windows[: len(plan.done)]
     names = write_deck(
         question.request.deck or "", card.card, folder, overwrite=overwrite

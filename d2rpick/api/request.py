@@ -111,7 +111,7 @@ class ReadingOptions:
 # A frozen class would cost each command 2 % of its start-up time.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
-    """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
+    """A question about a run with times in the unit of the history; contradictions raise ArgumentError.
 
     ``given`` names the options that were given, also those given with their default value.
     """

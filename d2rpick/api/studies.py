@@ -288,12 +288,11 @@ class Ledger:
                 f"{name}: cannot be written (not a regular file); give another file"
             )
         try:
-            with Path(name).open(
-                "a+b"
-            ) as file:  # This fails before the work begins if the file is not writable.
+            # Opening the file fails before the work begins if the file is not writable.
+            with Path(name).open("a+b") as file:
                 file.seek(0)
                 content = file.read()
-            if new:  # The first row creates the file again.
+            if new:  # The file is deleted, because the first row creates it again.
                 Path(name).unlink()
         except OSError as error:
             raise FormatError(

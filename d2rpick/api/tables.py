@@ -60,21 +60,21 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return table
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
-    # This is an object of xarray; only a DataArray has a name.
+    # The table is an object of xarray; only a DataArray has a name.
     if hasattr(table, "to_dataframe"):
         if hasattr(table, "name"):
             frame = table.to_dataframe(name=_SERIES_NAME)
         else:
             frame = table.to_dataframe()
         return pd.DataFrame(frame)
-    if hasattr(table, "collect"):  # This is a lazy frame of polars.
+    if hasattr(table, "collect"):  # The table is a lazy frame of polars.
         table = table.collect()
-    # This is a frame of polars, whose own conversion needs pyarrow.
+    # The table is a frame of polars, whose own conversion needs pyarrow.
     if hasattr(table, "columns") and hasattr(table, "get_column"):
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}
         )
-    if hasattr(table, "to_pandas"):  # This is a table of pyarrow or another library.
+    if hasattr(table, "to_pandas"):  # The table comes from pyarrow or another library.
         frame = table.to_pandas()
         if isinstance(frame, pd.Series):
             return frame.to_frame(_SERIES_NAME)

@@ -233,7 +233,7 @@ def read_into(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
+    """Read bytes from an offset into ``room`` and return their number; one system call is used if possible."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)
@@ -341,7 +341,7 @@ def add_checksum(text: str) -> str:
 
 
 def parse_record(line: bytes) -> dict[str, Any] | None:
-    """Return the record of a signed line; None if the line is damaged."""
+    """Return the record in a line with a checksum; None if the line is damaged."""
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
     if checksum != f'{_compute_checksum(body)}"}}'.encode():
         return None

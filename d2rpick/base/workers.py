@@ -188,7 +188,7 @@ def _begin_work(held: Connection) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
-        # returns only when the other end is closed, because nothing is ever sent
+        # poll() returns only when the other end is closed, because nothing is ever sent.
         held.poll(None)
         os._exit(1)
 

@@ -185,7 +185,7 @@ class _CommandGroup(Documented, click.Group):
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # This keeps Python from reporting an error when it closes the stream at exit.
+            # Writing to os.devnull keeps Python from reporting an error when it closes the stream at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)

@@ -466,7 +466,7 @@ def open_with_output(
     """
     from d2rpick.api.asked import open_requested_run
 
-    request.selection()  # This refuses contradictory options before a file is opened.
+    request.selection()  # The call refuses contradictory options before a file is opened.
     with show_reading(request.history, quiet=output.quiet):
         run = open_requested_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

@@ -351,9 +351,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
     """Refuse to start a program or write a file by settings, because another person may have written them."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
         reason = "programs, output files and overwrite are never taken from a file"
-    elif (
-        not option.expose_value
-    ):  # These options concern only one call, such as --help and --debug.
+    elif not option.expose_value:  # Options that are not exposed concern only one call, such as --help and --debug.
         reason = "this is never taken from a file"
     else:
         return

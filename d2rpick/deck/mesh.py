@@ -41,7 +41,7 @@ _ID_ENDS: Final = 7
 _HIGHEST: Final = 10**17  # upper limit of ids; larger numbers would overflow
 NO_NODE: Final = -1  # index of a missing node
 _DENSE: Final = 50_000_000  # largest id for which a table of all ids fits into memory
-NOTHING: Final = -1  # stands for a field that contains no id
+NOTHING: Final = -1  # placeholder for a field that contains no id
 # Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 

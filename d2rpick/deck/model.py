@@ -139,7 +139,7 @@ def make_ids(numbers: Iterable[int]) -> Places:
 
 
 def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
-    """Return the values that a function keeps from one of its points to the next, times ``scale``.
+    """Return the values at which a function is constant between two points, multiplied by ``scale``.
 
     Empty if it is never constant.
 

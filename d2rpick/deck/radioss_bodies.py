@@ -156,7 +156,7 @@ def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Return True if a body is never rigid; ``unused`` has the main nodes of the bodies that no leg activates."""
+    """Return True if a body is never rigid; ``unused`` are main nodes of bodies that no engine run activates."""
     return body.node.value in unused and not body.sensor
 
 

@@ -1,4 +1,4 @@
-"""Read keyword blocks of Radioss files: the legs in engine files, the switched bodies, and the starter deck.
+"""Read keyword blocks of Radioss files: engine runs in engine files, switched bodies, and the starter deck.
 
 A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
 for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
@@ -87,7 +87,7 @@ def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
-    """Return the result of `_find_marks` for a piece of complete lines."""
+    """Return offset and text of the lines in this piece that begin with ``/`` or ``#include``."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
@@ -136,7 +136,7 @@ def get_lines_below_title(card: Card) -> tuple[Row, ...]:
 
 
 class InitialVelocity(NamedTuple):
-    """An /INIV card: velocities at the start of a leg for ranges of nodes, or for a node group (0 for none)."""
+    """An /INIV card: velocities at the start of an engine run for ranges of nodes, or for a group (0 for none)."""
 
     card: Card
     ranges: tuple[tuple[int, int], ...]
@@ -158,9 +158,9 @@ class RadiossLeg:
     cap: Value[float] | None = None
     version: str = ""
     starts: list[InitialVelocity] = field(default_factory=list)
-    # Ids of the sensors that are reset at the start of the leg.
+    # Ids of the sensors that are reset at the start of the engine run.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # id of a sensor that ends the leg at an unknown time
+    sensor: int = 0  # id of a sensor that ends the engine run at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
@@ -177,7 +177,7 @@ def read_legs(source: SourceFile) -> list[RadiossLeg]:
 
 
 def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
-    """Return the main nodes that the first leg deactivates and no leg activates, in the order of the file."""
+    """Return the main nodes that the first engine run deactivates and no engine run activates, in file order."""
     is_rigid_in_first_leg: dict[int, bool] = {}
     activated: set[int] = set()
     for index, leg in enumerate(legs):
@@ -195,7 +195,7 @@ def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
 
 
 def _begin_leg(card: Card) -> RadiossLeg:
-    """Begin a leg with its /RUN."""
+    """Begin an engine run with its /RUN card."""
     missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
     return RadiossLeg(
@@ -204,7 +204,7 @@ def _begin_leg(card: Card) -> RadiossLeg:
 
 
 def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
-    """Add a card of an engine file to its leg."""
+    """Add a card of an engine file to its engine run."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(

@@ -124,7 +124,7 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
         for flaw in _check_wall(wall, starter, groups, bodies)
     ]
     flaws += [*_check_starts(run, groups, bodies)]
-    # Otherwise an include file that was not read may contain a velocity.
+    # If an include file was not read, it may contain a velocity.
     if not run.deck.unread:
         flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))
@@ -314,7 +314,7 @@ def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
 def _check_starts(
     run: RadiossRun, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield the flaws of bodies that are on in a leg whose /INIV moves their nodes but not their main node."""
+    """Yield the flaws of bodies that are on in an engine run whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
         for _, rigid, nodes in leg.switched:

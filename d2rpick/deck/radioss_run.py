@@ -1,4 +1,4 @@
-"""Read a Radioss run: when its legs or time sensors make each part rigid, and which parts stay rigid.
+"""Read a Radioss run: when its engine runs or time sensors make each part rigid, and which parts stay rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
 in later runs unless an engine file changes it.
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, repr=False)
 class RadiossRun:
-    """A Radioss run: its starter deck (if found) and its legs in the order of their numbers.
+    """A Radioss run: its starter deck (if found) and its engine runs in the order of their numbers.
 
     ``deck`` lists its files.
     """
@@ -70,7 +70,7 @@ class RadiossRun:
 
     @cached_property
     def named(self) -> frozenset[int]:
-        """Return the main nodes that the legs switch."""
+        """Return the main nodes that the engine runs switch."""
         main_nodes: set[int] = set()
         for leg in self.legs:
             for _, _, nodes in leg.switched:
@@ -79,7 +79,7 @@ class RadiossRun:
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """Return the time of the first reset of each sensor (/SENS/RESET), which is the start of a leg [time]."""
+        """Return the time of the first reset of each sensor (/SENS/RESET), at the start of an engine run [time]."""
         first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
@@ -173,7 +173,7 @@ def _read_include(
 
 @dataclass(eq=False, repr=False)
 class LegSwitch(SwitchSet):
-    """Bodies that are switched when a leg begins, at time ``at``; ``stop_field`` is the field with that time."""
+    """Bodies that an engine run switches when it begins, at time ``at``; ``stop_field`` contains that time."""
 
     at: float = 0.0
     stop_field: CardField | None = None
@@ -185,7 +185,7 @@ class LegSwitch(SwitchSet):
 
     @property
     def time_field(self) -> CardField:
-        """Return the field with the end of the previous leg, or the keyword in the first leg."""
+        """Return the field with the end of the previous engine run, or the keyword in the first engine run."""
         return self.stop_field or self.card.here
 
 
@@ -199,7 +199,7 @@ class RunWindows:
 
 
 def is_in_order(legs: list[RadiossLeg]) -> bool:
-    """Return True if no leg is missing from the first to the last, and each leg ends at a known time.
+    """Return True if no engine run is missing from the first to the last, and each ends at a known time.
 
     No leg may end before the previous one.
     """
@@ -220,7 +220,7 @@ def is_in_order(legs: list[RadiossLeg]) -> bool:
 def find_run_windows(
     run: RadiossRun, contacts: Contacts | None = None, forces: Forces | None = None
 ) -> RunWindows:
-    """Return the windows of every body that a leg or a sensor switches.
+    """Return the windows of every body that an engine run or a sensor switches.
 
     A body with unknown parts is one unit, named by its main node.  If the legs are not in order there are no windows.
     For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
@@ -262,7 +262,7 @@ def find_run_windows(
 
 
 def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
-    """Yield the cards of all legs that switch bodies, with their times."""
+    """Yield the cards of all engine runs that switch bodies, with their times."""
     previous: RadiossLeg | None = None
     for leg in legs:
         if previous:
@@ -287,7 +287,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of one unit of a body, which is rigid from the start unless the first leg deactivates it."""
+    """Return the windows of one unit of a body, which is rigid from the start unless it is deactivated there."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (
@@ -425,7 +425,7 @@ def find_time_units(run: RadiossRun) -> tuple[str, str]:
 
 
 def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
-    """Return the parts of the bodies that the first leg deactivates, ascending; empty without a starter deck."""
+    """Return the parts of the bodies that the first engine run deactivates, ascending; empty without a starter deck."""
     nodes = find_bodies_kept_off(run.legs[:1])
     bodies = run.starter.bodies if run.starter else ()
     groups = {
@@ -436,7 +436,7 @@ def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
 
 
 def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
-    """Return the parts of the bodies that are always on, because no leg and no sensor switches them.
+    """Return the parts of the bodies that are always on, because no engine run and no sensor switches them.
 
     Without engine files all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
@@ -484,7 +484,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies with complete parts that no leg names, in a run with ``windows``.
+    """Return the bodies that contain whole parts and are named by no engine run, in a run with ``windows``.
 
     None if there are none.
     """

@@ -120,7 +120,7 @@ class _Search:
                     )
                 else:
                     marks_by_piece[begin] = ()
-        # Only now is it certain that the file has not changed.
+        # Only after this check is it certain that the file has not changed.
         self._found |= marks_by_piece
 
     def stop(self) -> None:
@@ -336,7 +336,7 @@ class Block:
         """Return the data lines without comments, each with the number of lines from the keyword line."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
-        # Otherwise the block would contain the blanks before the next keyword.
+        # Without this line, the block would contain the blanks before the next keyword.
         if last and self.end is None:
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)

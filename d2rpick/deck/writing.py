@@ -55,7 +55,7 @@ _ONCE = {
     "END",
 }
 
-# an engine run writes its restart file only at its end
+# An engine run writes its restart file only at its end
 _NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -277,7 +277,7 @@ def _keep_bodies_off(
         node for node in find_bodies_kept_off(legs) if node not in switched_nodes
     ]
     if printed_leg.cap is None:
-        # The text of a leg without time-step limit ends with an /RBODY/OFF card; these lines are appended to that card.
+        # An engine run without time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
         return write_numbers(off_nodes)
     return write_bodies_off(off_nodes)
 

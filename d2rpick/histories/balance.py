@@ -52,10 +52,10 @@ _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
 # Normalised names of the spring energy in Radioss, in LS-DYNA's glstat, and in the glstat branch of a binout.
-# In tables these names may have another meaning.
+# In tables, the names of spring energies may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
 # Largest spring energy that is treated as zero, as a share of the peak internal energy.
-# This limit is the precision of a glstat and of single precision, which have six to seven digits.
+# The limit corresponds to the six to seven digits of a glstat and of single precision.
 _NONE: Final = 1e-6
 # Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
@@ -181,7 +181,7 @@ class _Columns:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        # This becomes True if a momentum is read in place of the velocity.
+        # True if a momentum is read in place of the velocity.
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
@@ -238,7 +238,7 @@ class _Columns:
         return None
 
     def _values(self, name: str) -> Samples | None:
-        """Return a column with finite numbers in all states, or None."""
+        """Return a column; None if it is missing, or not all of its values are finite."""
         values = give_if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None

@@ -96,7 +96,7 @@ def find_force(
 def join_contact_forces(
     pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
 ) -> ContactForce:
-    """Join the forces of one contact in all legs of a run; ``keep`` marks the valid states of all legs.
+    """Join the forces of one contact in all restart segments of a run; ``keep`` marks the valid states.
 
     Between two legs the force acts if it acts just before or after.
     """

@@ -185,7 +185,7 @@ class OnDisk(Content):
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Return an array of ``size`` bytes; small arrays share a buffer, since new memory costs more than reading."""
+        """Return an array of ``size`` bytes; small arrays share a buffer, as new memory costs more than reading."""
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -290,7 +290,7 @@ class Scattered(OnDisk):
         self._digest = ""
 
     @cached_property
-    def _own(self) -> local:  # type: ignore[override]
+    def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
         """The window of each thread; it is created at its first use, because most files need no window."""
         from threading import local
 
@@ -387,7 +387,7 @@ def count_line_number(data: Content, address: int) -> int:
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each offset, shape (n, width)."""
-    # This overlapping view has a field at every offset, so that fields can be selected by index.
+    # The overlapping view has a field at every offset, so that fields can be selected by index.
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

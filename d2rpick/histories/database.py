@@ -1,4 +1,4 @@
-"""Represent a file of a run as a database of columns that are read on request, and several legs as one database.
+"""Represent a file of a run, and several restart segments, as a database of columns that are read on request.
 
 Databases of different formats that one run wrote are companions; they are checked here for being of one run.
 """
@@ -57,7 +57,7 @@ _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one leg of a run, in the units of the run; each reader defines what they contain.
+    """The states of one restart segment of a run, in the units of the run; each reader defines what they contain.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -116,7 +116,7 @@ class Database:
         return {}
 
     def branch(self, name: str) -> Database:
-        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError if missing."""
+        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError without it."""
         reason = self.no_channels if name == "glstat" else self.no_parts
         raise FormatError(f"{self.source}: {reason}")
 
@@ -159,12 +159,12 @@ class Database:
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
-        """Return the precision of the times and of these channels, or of the parts without channels."""
+        """Return the precision of the times and of these channels; without channels, that of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 
 class Legs:
-    """The legs of one run, in the order of their start, as one `Database`; in overlaps the newer leg is used.
+    """The restart segments of one run, in order, as one `Database`; in overlaps the newer segment is used.
 
     A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
     are used only if all legs have none.
@@ -181,7 +181,7 @@ class Legs:
         self._own_notes = notes  # notes on files that were not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # The times of a single leg may not be known yet.
+        if len(legs) > 1:  # The times of a single restart segment may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
@@ -195,7 +195,7 @@ class Legs:
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return where a later read of the files of all legs can begin; empty if they are read completely."""
+        """Return where a later read of the files of the run can begin; empty if they are read completely."""
         points: dict[str, ResumePoint] = {}
         for leg in self._files:
             points |= leg.find_resume_points()
@@ -208,7 +208,7 @@ class Legs:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Columns of the whole model that all legs have."""
+        """Columns of the whole model that all restart segments have."""
         common = set(self._legs[0].channels)
         for leg in self._legs[1:]:
             common.intersection_update(leg.channels)
@@ -235,15 +235,15 @@ class Legs:
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that all legs have."""
+        """Parts that all restart segments have."""
         return mark_namesakes(
             part for part in self._legs[0].parts if part.id not in self._passing
         )
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the legs, and on what was left out between them."""
-        # The columns are read first, because reading them may add notes to the legs.
+        """Notes of the restart segments, and on states between them that were left out."""
+        # The columns are read first, because reading them may add notes to the restart segments.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -289,7 +289,7 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of the given parts; energies are kept read-only, since requests repeat."""
+        """Return a quantity of the given parts; energies are kept, because they are requested repeatedly."""
         if (
             quantity == "internal_energy"
             and self._energies
@@ -307,7 +307,7 @@ class Legs:
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:
-        """Numbers of the nodes whose displacements all legs have."""
+        """Numbers of the nodes whose displacements all restart segments have."""
         common = set(self._legs[0].node_ids)
         for leg in self._legs[1:]:
             common.intersection_update(leg.node_ids)
@@ -320,7 +320,7 @@ class Legs:
         )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the leg whose numbers have the fewest digits."""
+        """Return the precisions of the restart segment whose numbers have the fewest digits."""
         precisions = [leg.precisions(names) for leg in self._legs]
         coarsest_time = min((time for time, _ in precisions), key=_count_digits)
         coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
@@ -328,7 +328,7 @@ class Legs:
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts and rigid walls that all legs have."""
+        """Forces of the contacts and rigid walls that all restart segments have."""
         legs = [
             {force.name: force for force in leg.contact_forces} for leg in self._legs
         ]
@@ -341,7 +341,7 @@ class Legs:
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:
-        """Ids of the parts that are missing in some legs."""
+        """Ids of the parts that are missing in some restart segments."""
         legs = Counter(part.id for leg in self._legs for part in leg.parts)
         return tuple(id_ for id_, count in legs.items() if count < len(self._legs))
 
@@ -379,7 +379,7 @@ class Legs:
         return keep, (*notes, *unused, *_note_holes(valid_times))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
-        """Join the columns of the legs, and remove the invalid states."""
+        """Join the columns of the restart segments, and remove the invalid states."""
         whole = _join_columns(columns)
         return whole if keep.all() else whole[keep]
 
@@ -398,14 +398,14 @@ def _list_times(database: Database | Legs) -> list[Samples]:
 
 
 def _find_start(leg: Database) -> float:
-    """Return the first time of a leg, -inf if it has no states."""
+    """Return the first time of a restart segment, -inf if it has no states."""
     return min(
         (float(time[0]) for time in _list_times(leg) if time.size), default=-np.inf
     )
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a leg: its start, then its name, regardless of the order of the arguments."""
+    """Return the sort key of a restart segment: its start, then its name, regardless of the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
@@ -416,7 +416,7 @@ def _count_digits(precision: Precision) -> int:
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output; a leg may be missing there."""
+    """Return notes on long intervals without output; a restart segment may be missing there."""
     if time.size < 4:
         return ()
     pieces = (

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-_DIGITS: Final = 6  # significant digits of a printed time
+_DIGITS: Final = 6  # number of significant digits of a printed time
 # Number of significant digits kept in a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 
@@ -36,12 +36,12 @@ _NEVER_MEANT: Final = 0.01
 # A time converted to a smaller unit must lie beyond this first share of the record to be suggested.
 _HARDLY_MEANT: Final = 0.05
 # A td among this number of first states is assumed to have another unit, because it would hardly save time.
-# Both such a td and 1000 times its value lie in the record only if the record has 1000 states or more.
+# A td and 1000 times this td both lie in the record only if the record has 1000 states or more.
 _FIRST_STATES: Final = 10
 
 
 def round_as_read(time: float) -> float:
-    """Return the time that a user types who has read this time with six digits.
+    """Return the time that a user types after reading this time with six digits.
 
     Examples
     --------

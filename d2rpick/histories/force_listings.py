@@ -55,7 +55,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Return the forces of files; several files with the same contact are legs of a run.
+    """Return the forces of files; several files with the same contact are restart segments of a run.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the legs of one contact; in overlaps the newer leg is used."""
+    """Join the restart segments of one contact; in overlaps the newer segment is used."""
     return join_contact_forces(
         pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )

@@ -21,7 +21,7 @@ _FROM_FRAME: Final = (
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
 # LS-DYNA's ASCII databases that contain no internal energy of the model or of its parts.
-# They are recognised by their file names, and by words that no other database contains.
+# ASCII databases are recognised by their file names, and by words that no other database contains.
 _DYNA_DATABASES: Final = (
     ("nodout", rb"n o d a l   p r i n t   o u t"),
     ("elout", rb"e l e m e n t   s t r e s s"),

@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of those of the parts with these indices that move [mass]; NaN if one mass is unknown."""
+        """Return the mass of the moving parts among these indices [mass]; NaN if one mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -321,8 +321,15 @@ class History:
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, then of the whole model, as far as they are known."""
+        """Momenta of the parts, and then of the whole model, if they are known."""
         return self.evidence.momenta
+
+    def find_momenta(self, *, of_parts: bool) -> Momenta | None:
+        """Return the momenta of the parts, or of the whole model; None if they are not written."""
+        for momenta in self.momenta:
+            if (momenta.parts is not None) is of_parts:
+                return momenta
+        return None
 
     @property
     def masses(self) -> Samples | None:
@@ -372,7 +379,7 @@ class History:
 
     @property
     def left_beside(self) -> str:
-        """A question about later legs in the same folder that the user did not name; empty if there are none."""
+        """A question about later restart segments that the user did not name; empty if the folder has none."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.source import find_later_legs
 
@@ -422,7 +429,7 @@ class History:
             )
 
     def energy_at(self, time: float, argument: str = "") -> float:
-        """Return the energy at ``time``, linear between the states; a RangeError for other times names ``argument``."""
+        """Return the energy at ``time``, interpolated linearly; a RangeError for other times names ``argument``."""
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         # A slice is passed, because numpy would copy the whole read-only array.
@@ -430,7 +437,7 @@ class History:
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
-        """Return the energies at given times within the record, linear between the states, in their shape."""
+        """Return the energies at times within the record, interpolated linearly, in the shape of these times."""
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])

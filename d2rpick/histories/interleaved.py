@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Factor by which several energies vary more between rows of one time than between times.
-# With coarsely printed times, both variations of a single energy are equal.
-# Noise can raise the first variation to the second one times the number of rows per time.
+# An energy belongs to several parts if it varies this many times more from row to row than noise explains.
+# Without noise, a single energy varies as much from row to row as from time to time.
+# Noise multiplies the variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 

@@ -34,7 +34,7 @@ _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 # date on which OpenRadioss corrected the energy of switched elements
 _FIXED: Final = (2026, 1, 13)
-# Commits of the last weeks before this correction; an engine built from them may show the year of the correction.
+# Commits of the last weeks before this date; an engine built from them may show the year of the correction.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
@@ -94,7 +94,7 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended according to the listing of its last history; None if it is unknown.
+    """Return how a run ended, according to the listing of its last history; None if it is unknown.
 
     A leg that was told to stop has not ended the run, nor has a leg with a next leg.
     """
@@ -134,7 +134,7 @@ def read_tail(path: str, size: int) -> bytes:
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
-    """Return the evidence that an engine that switches rigid bodies is older than the correction; else empty."""
+    """Return the evidence that an engine is too old to switch rigid bodies without wrong energies; else empty."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
     commit = re.search(_COMMIT, head)
@@ -150,7 +150,7 @@ def _detect_old_engine(head: bytes, tail: bytes) -> str:
 
 
 class Timing(NamedTuple):
-    """Number of cycles of a leg, and the CPU times of the whole leg and of its elements [s]."""
+    """Number of cycles of a restart segment, and the CPU times of the whole segment and of its elements [s]."""
 
     name: str
     cycles: int

@@ -24,8 +24,8 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match, from the best to the worst.
-# They depend on the words that a name contains in addition to the quantity.
+# Ranks of a match between a name and a quantity, from the best to the worst.
+# The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -53,7 +53,7 @@ _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)
 _SOURCE: Final = re.compile(r"t\d\d")
 # Names of datasets whose group names the quantity, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-# Names of datasets next to the values that contain no quantity.
+# Names of datasets that lie next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
@@ -71,7 +71,7 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-# Normalised name of the rotational energy, which Radioss writes separately from the kinetic energy.
+# Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
 ROTATION_ENERGY: Final = "rotationenergy"
 # Pattern of other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
@@ -118,7 +118,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # This is not a path but a name with a slash, such as "total energy / initial energy".
+    # The name is not a path but contains a slash, such as "total energy / initial energy".
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -309,7 +309,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    # This term is contained in the kinetic energy.
+    # The rotational energy is contained in the kinetic energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)

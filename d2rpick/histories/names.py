@@ -1,4 +1,4 @@
-"""Interpret the names of columns, units and parts, and find those that the user selects."""
+"""Interpret the names of columns, units and parts, and find the names that the user selects."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ INTERNAL_ENERGY: Final = frozenset(
 )  # fmt: skip
 
 # Normalised names of other quantities of the whole model: energies, momentum, velocity and mass.
-# The names come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
+# The names of quantities come from LS-DYNA, Radioss, Abaqus, Exodus, lasso-python and several languages.
 # The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(

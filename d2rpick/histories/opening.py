@@ -48,9 +48,9 @@ _MOST_TABLES: Final = 3
 # Characters at the end of the name of a later file of a family.
 _DIGITS: Final = "0123456789"
 
-# Largest difference of energies at a common time of two legs of one run, as a share of the largest energy.
+# Largest difference of energies at a common time of two restart segments, as a share of the largest energy.
 _SAME = 0.01
-# Number of parts whose energies are compared to recognise legs of different runs.
+# Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50
 
 
@@ -63,11 +63,11 @@ class Reader(Protocol):
     def open_legs(
         self, sources: Sequence[Source], selection: Selection
     ) -> Sequence[Database]:
-        """Open files of this format as the legs of one run; raise FormatError if one has another format."""
+        """Open files of this format as the restart segments of one run; raise FormatError if one has another format."""
 
 
 def load_reader(kind: str) -> Reader:
-    """Import the reader of a format, a key of `READERS`."""
+    """Import the reader of a format, which is a key of `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
     )
@@ -76,7 +76,7 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run: files of one format are its legs, files of different formats are companions.
+    """Open the files of one run: files of one format are its restart segments, other files are companions.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def open_sources(
     input_format: str = "auto",
     notes_on_names: tuple[str, ...] = (),
 ) -> OpenedRun:
-    """Open the files of one run from their bytes; arguments and errors as in `open_run`.
+    """Open the files of one run from their bytes; arguments and errors are those of `open_run`.
 
     ``notes_on_names`` are about the names by which the files were found.
     """
@@ -245,10 +245,10 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats, those that contain only forces last; raise FormatError if there are no others."""
+    """Return the formats; formats that contain only forces come last. Raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # reading the branch raises the error with the best message about missing data
+        # Reading the branch raises the error with the best message about missing data
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
@@ -281,7 +281,7 @@ def _find_later_files(sources: Sequence[Source]) -> set[str]:
 def _open_legs_of_formats(
     kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
-    """Open the files by format; return the legs of each format, and notes on files that were not used.
+    """Open the files by format; return the restart segments of each format, and notes on files that were not used.
 
     d3plot families exist next to everything that LS-DYNA writes: they are used only if the other files leave
     something out, and if there are other files, a family that cannot be read is not an error.
@@ -422,7 +422,7 @@ def check_legs(legs: Sequence[Database]) -> None:
 
 
 def _list_columns_and_parts(leg: Database) -> set[str | int]:
-    """Return the columns and part ids of a leg."""
+    """Return the columns and part ids of a restart segment."""
     return {*leg.channels, *(part.id for part in leg.parts)}
 
 
@@ -451,7 +451,7 @@ def _read_part_energies(leg: Database, states: Indices) -> Samples:
 def _find_shared_states(
     first: Samples, second: Samples
 ) -> tuple[Indices, Indices] | None:
-    """Return the indices of common times in two legs; if one leg begins later, only those at its start."""
+    """Return the indices of common times in two restart segments; only the first of them if one begins later."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
         return None

@@ -151,7 +151,7 @@ class OpenedRun:
     def momenta(
         self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
     ) -> tuple[Momenta, ...]:
-        """Return the momenta of the parts and of the whole model, as far as they are written.
+        """Return the momenta of the parts and of the whole model, if the files contain them.
 
         ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
         """
@@ -302,7 +302,7 @@ class OpenedRun:
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if not written."""
+        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if they are missing."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
@@ -356,7 +356,7 @@ class OpenedRun:
         """Return the database with parts; if there is none, raise a FormatError that names what the files contain."""
         holder = self._with_parts()
         if holder is None:
-            # This database raises the error with the best message about missing parts.
+            # The first database raises the error with the best message about missing parts.
             self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
@@ -376,7 +376,7 @@ class OpenedRun:
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        # The condition is true if only springs have energy.
+        # Only springs have energy.
         if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [
@@ -455,7 +455,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # This database raises the error with the best message about missing channels.
+                    # A database without channels raises the error with the best message about missing channels.
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:

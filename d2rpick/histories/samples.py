@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Smallest share of states that repeat the previous time in a table with a row for each part.
 _REPEATED: Final = 0.49
-# Smallest number of times; with fewer times, equal times in several rows may be a coincidence.
+# Smallest number of times that is examined; with fewer, equal times in several rows may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of output intervals before and after a restart; other curves and unsorted tables exceed it.
 _ALIKE = 2.0
@@ -82,7 +82,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    # This gives the same result as mean(), which is slow for few values.
+    # The sum is used instead of mean(), which is slow for few values.
     t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
@@ -304,7 +304,7 @@ def find_first_above(
     >>> find_first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
-    # tops[i] is the largest of ``_TOGETHER**i`` values from each index on.
+    # Element i of ``tops`` contains the largest of ``_TOGETHER**i`` values from each index on.
     tops = [np.append(values, np.inf)]
     width = 1
     indices = np.arange(values.size + 1)

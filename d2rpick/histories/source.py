@@ -35,7 +35,7 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
 
-# Pattern of a file name with the number of its leg: runT01, binout0001; the first leg may have no number.
+# Pattern of a file name with the number of its restart segment (runT01, binout0001), if there is one.
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
@@ -87,7 +87,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # the files of a family are checked at each read
+    families = _open_families(files)  # The files of a family are checked at each read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -343,7 +343,7 @@ def _unpack_pieces(
 
     pieces: list[bytes] = []
     size = 0
-    unpacker = zlib.decompressobj(wbits=31)  # the value 31 selects the gzip format
+    unpacker = zlib.decompressobj(wbits=31)  # The value 31 selects the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         unread = packed[end - _BLOCK : end]
         while unread:
@@ -382,8 +382,8 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its leg; without a number the leg is 0."""
+    """Split a file name into its stem and the number of its restart segment, which is 0 without a number."""
     match = _NUMBERED.fullmatch(name)
-    # the match is never None, because the pattern matches any text
+    # The match is never None, because the pattern matches any text
     assert match is not None
     return match[1], int(match[2] or 0)

@@ -187,15 +187,15 @@ def _describe_error_at(offer: Offer) -> str:
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts below."""
+    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts above them."""
     listed_offers = select_offers(trade_off, display.limit)
     offer_table = tables.select_known_columns(*build_offer_table(listed_offers))
     reasons = tables.format_as_list(list_offer_reasons(listed_offers))
     return "\n\n".join(
         [
             *tables.format_as_list(list_answer_lines(trade_off)),
-            tables.as_markdown(*offer_table),
             *reasons,
+            tables.as_markdown(*offer_table),
         ]
     )
 

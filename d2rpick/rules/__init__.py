@@ -255,7 +255,7 @@ def check_deck(
     content: bytes | None = None,
     restarts: Sequence[str] = (),
 ) -> Checked:
-    """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
+    """Read a deck with its includes, or a Radioss run with its engine runs, and apply the rules.
 
     Parameters
     ----------

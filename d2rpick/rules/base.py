@@ -278,7 +278,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # Empty for Radioss, because this factor exists in LS-DYNA decks only.
+        ]  # The list is empty for Radioss, because only LS-DYNA decks scale ENDTIM.
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -404,18 +404,18 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end time of the last leg as written."""
+        """Return the end time of the last engine run as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
     def switching(self) -> int:
-        """Return the number of switching cards: those in the legs, the bodies with a sensor, and the rigid parts."""
+        """Return the number of switching cards in engine runs, of bodies with a sensor, and of rigid parts."""
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
+        """Return the bodies that a sensor switches at unknown times, and the engine runs that a sensor ends."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.radioss_sensors import find_active_spans
 
@@ -467,7 +467,7 @@ class RunCase(Case):
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
-        """Return the indices of the legs in which a part or body is rigid, each with its windows."""
+        """Return the indices of the engine runs in which a part or body is rigid, each with its windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value

@@ -148,7 +148,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return the engine files of a run by file name. A leg is its end time and ON, OFF or nothing for /RBODY."""
+    """Return engine files by file name; an engine run is given by its end time and ON, OFF or nothing for /RBODY."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""

@@ -440,7 +440,7 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return the bodies that no leg switches, each with its deforming parts; None if the parts have no history."""
+    """Return the bodies that no engine run switches, with their deforming parts; None if these have no history."""
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_run import find_left_rigid
 

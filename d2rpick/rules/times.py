@@ -50,7 +50,7 @@ _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_c
 )
 
 _DECADES = 3.0  # number of powers of ten between two adjacent units of time
-# Tolerance of the end time as a power of ten, because a reference run may end at half of the time.
+# Tolerance for the ratio of end times, as a power of ten; a reference run may end at half of the time.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
     "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"

@@ -185,7 +185,7 @@ class Driver:
         )
 
     def _start_solver(self, program: str, number: int) -> None:
-        """Start the solver on the deck of a leg: the starter if ``leg`` is 0, else the engine."""
+        """Start the solver on the deck of a leg: the starter if its ``number`` is 0, else the engine."""
         deck = self.solver.file(number, ".rad").name
         self.solver.start(self.commands.words(program, deck), number)
 

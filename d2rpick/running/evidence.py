@@ -20,7 +20,6 @@ from d2rpick.running.record import (
     GrowingColumn,
     GrowingRecord,
     RunningMaximum,
-    find_momenta,
 )
 from d2rpick.running.witness import GrowingWitness, Quiet
 
@@ -75,8 +74,8 @@ class GrowingEvidence:
         """Append states, which must have the same quantities as the states so far."""
         self._record.add(states)
         balance = states.balance
-        of_model = find_momenta(states, of_parts=False)
-        of_parts = find_momenta(states, of_parts=True)
+        of_model = states.find_momenta(of_parts=False)
+        of_parts = states.find_momenta(of_parts=True)
         self.moving = []
         if of_parts is not None and of_parts.time.size:
             self._add_parts(of_parts, of_model, balance)
@@ -176,7 +175,7 @@ class GrowingEvidence:
             return None
         if not witness.members:
             return 0.0
-        momenta = find_momenta(history, of_parts=witness.parts is not None)
+        momenta = history.find_momenta(of_parts=witness.parts is not None)
         assert momenta is not None
         times = witness.time[[0, first, last]]
         begin, start, end = np.searchsorted(momenta.time, times).tolist()
@@ -219,7 +218,7 @@ class GrowingEvidence:
 
         The last of these periods may last to the end of the record.
         """
-        momenta = find_momenta(self.history, of_parts=True)
+        momenta = self.history.find_momenta(of_parts=True)
         if momenta is None:
             return []
         rigid_times = []

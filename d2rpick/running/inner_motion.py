@@ -16,7 +16,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.record import GrowingColumn, RunningMaximum, find_momenta
+from d2rpick.running.record import GrowingColumn, RunningMaximum
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -225,7 +225,7 @@ class InnerMotion:
 
     def take(self, states: History) -> None:
         """Append states that the evidence already contains."""
-        momenta = find_momenta(states, of_parts=True)
+        momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses)
             for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):

@@ -170,11 +170,3 @@ def _contains(table: Table, state: int, last_state: Table) -> bool:
         if not np.allclose(value, last_value, rtol=0, atol=tolerance, equal_nan=True):
             return False
     return True
-
-
-def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
-    """Return the momenta of the parts, or of the whole model; None if they are not written."""
-    for momenta in history.momenta:
-        if (momenta.parts is not None) is of_parts:
-            return momenta
-    return None

@@ -490,7 +490,6 @@ def test_a_button_copies_what_stands_below_it(paper: Path, browser: Browser) -> 
 @mark_for_browser
 def test_the_pair_of_a_card_is_not_told_twice(paper: Path, browser: Browser) -> None:
     """The cards are those of the requested td and of the td that suggest chooses; another td lies between them."""
-    browser.open(paper)
     why = '.now dd[data-value="why"]'
     for card, clicks in enumerate((0, 2)):
         browser.open(paper)

@@ -1,4 +1,4 @@
-"""Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one leg of a run.
+"""Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one restart segment of a run.
 
 A branch has a directory ``metadata`` (title, version, part ids, part titles) and one directory per state,
 ``d000001`` and so on, of variables such as ``internal_energy``: one value in glstat, one per part in matsum.
@@ -36,7 +36,7 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg, because a solver writes all files of a binout to one folder."""
+    """Open the files of each folder as one restart segment; a solver writes all files of a binout to one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
@@ -45,7 +45,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
 
 
 class Binout(Database):
-    """All binout files of one leg, in the order of their family, read as one `Database`.
+    """All binout files of one restart segment, in the order of their family, read as one `Database`.
 
     Raises FormatError if a file is not a binout, or if none of them has glstat, matsum or contact forces.
     """
@@ -112,7 +112,7 @@ class Binout(Database):
         raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        """Return the message that no file of the leg has a branch of this name."""
+        """Return the message that no file of the restart segment has a branch of this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
             f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "

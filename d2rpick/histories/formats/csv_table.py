@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column other than times, or the only column named like an internal energy."""
+    """Return the only numeric column other than times, or the only column whose name means an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -244,7 +244,7 @@ class Table(Database):
         self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        # This becomes False if a row shows that a column is not numeric.
+        # False after a row has shown that a column is not numeric.
         self._together = True
         if not is_skipped(text.unended):
             self.complete = _is_whole_row(
@@ -383,8 +383,8 @@ class Table(Database):
         if column in self._failed:
             raise self._failed[column]
         if column not in self._read and self._together:
-            # The first pass reads the required columns, and the columns that show a flight.
-            # The second pass reads all other columns, because requests for them mostly follow each other.
+            # The first pass over the table reads the required columns, and the columns that show a flight.
+            # The second pass over the table reads all other columns, because requests for them mostly follow.
             quantities = [
                 position
                 for name, position in self._columns.items()

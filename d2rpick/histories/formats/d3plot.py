@@ -67,7 +67,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each family of files as a leg of the run; a family starts with a file that has a header."""
+    """Open each family of files as a restart segment of the run; its first file has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")
@@ -218,7 +218,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        # This is the usual case, in which the files need no separate checks.
+        # Usually each file is complete and needs no check of its own.
         return _States(rows)
     states_of_files = []
     for file, begin, piece, word in zip(
@@ -257,7 +257,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # This file contains no states; they begin in the next file.
+        ended = True  # The states begin in the next file of the family.
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]

@@ -70,7 +70,7 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Read this number of counts from the file; raise FormatError if one of them is negative."""
+        """Read ``count`` integers from the file, and advance; raise FormatError if one of them is negative."""
         counts = self._words.integers(self.at, count)
         if min(counts) < 0:
             raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")
@@ -102,7 +102,7 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        # This version of the airbag data has a word for the number of chambers.
+        # Version 4 of the airbag data has a word for the number of chambers.
         self.at += version == 4
         # Each value has a type and a name.
         self.at += 9 * (of_geometry + of_particle + of_airbag)

@@ -38,7 +38,7 @@ _SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
 # Index of the word that contains the name of the release; the release number follows.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # added to the file type if ids have 8 bytes
+LONG_IDS: Final = 1000  # number that is added to the file type if ids have 8 bytes
 _DIMENSIONS: Final = range(2, 10)
 
 

@@ -20,7 +20,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[d3plot.D3plot]:
-    """Open each family as a leg of the run."""
+    """Open each family as a restart segment of the run."""
     legs = d3plot.open_legs(sources, selection)
     for leg in legs:
         leg.format = "d3thdt"

@@ -94,7 +94,7 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # This becomes True when a request has compared a part of each block.
+        # True after a request has compared a part of each block.
         self._trusted = False
         # Bits that vary between the blocks of a long sequence of equal blocks, by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
@@ -424,7 +424,7 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return what `_alike` returns, for the blocks of one sequence, which have one example."""
+        """Return True if all blocks of one sequence equal their example, as `_alike` does for all sequences."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)

@@ -59,7 +59,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run; an incomplete last state must have the selected lines."""
+    """Open each file as a restart segment of the run; an incomplete last state must have the selected lines."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -95,7 +95,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # This becomes False if a state lacks a line that other states have.
+        # False if a state lacks a line that other states have.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]

@@ -69,7 +69,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a leg of the run. Selected columns take precedence over the branches of a saved binout."""
+    """Open each file as a restart segment. Selected columns take precedence over branches of a saved binout."""
     return [_open_leg(source, selection) for source in sources]
 
 
@@ -87,7 +87,7 @@ def _open_leg(source: Source, selection: Selection) -> Database:
 
 
 def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; {} for a file of another layout."""
+    """Open the glstat and matsum branches that lasso-python saved; return {} for a file of another layout."""
     with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
@@ -337,7 +337,7 @@ def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Col
 def _find_only_energy(
     columns: Sequence[Column], time: Column | None, source: str
 ) -> Column:
-    """Return the only column named like an internal energy, or the only one next to a time."""
+    """Return the only column whose name means an internal energy, or the only column besides a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:

@@ -142,7 +142,7 @@ def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str
 
 
 def _join_names(upper: str, lower: str) -> str:
-    """Join the names of a column in two rows; the name of a time is not joined."""
+    """Join the names of a column from two rows, unless the column is the time."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
 

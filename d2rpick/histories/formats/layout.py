@@ -229,7 +229,7 @@ def _find_rows(
             counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            # If no row has a last cell, every row ends with a separator.
+            # If the last cell of every row is empty, every row ends with a separator.
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
             if columns > 1 and count > best_count:
@@ -244,7 +244,7 @@ def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
     """Return for each cell of a row if it is a number or missing; an empty tuple if the line is not a row."""
-    # This is usual, because most separators that are tried are wrong.
+    # Most lines have only one cell, because most separators that are tried are wrong.
     if len(cells) < 2:
         return ()
     written = [form.number(cell) is not None for cell in cells]

@@ -50,7 +50,7 @@ _TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # text that begins the lines of a part
 # The part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
-# stands for a part number that is damaged, or too long for its columns
+# placeholder for a part number that is damaged, or too long for its columns
 _UNREADABLE: Final = -1
 # Largest part number that fits into its eight columns.
 _WIDEST: Final = 99_999_999
@@ -85,7 +85,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
-    """Open each file as a leg of the run."""
+    """Open each file as a restart segment of the run."""
     return [Matsum(source.data, source.name) for source in sources]
 
 

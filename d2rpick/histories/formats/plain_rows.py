@@ -146,7 +146,7 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
 
 
 def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Return True if all rows have their number of cells and either all or none end with a separator."""
+    """Return True if all rows have the right number of cells and either all or none end with a separator."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     ends = signs == ord("\n")

@@ -112,7 +112,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
-    """Open each file as a leg of the run.
+    """Open each file as a restart segment of the run.
 
     A time history with its own output interval (T01a, by /ATFILE) has no global values and is no leg next to other
     files.

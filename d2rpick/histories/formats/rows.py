@@ -101,7 +101,7 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """State of the reader of a table: the last time, gaps, and the lines found below the table."""
+    """State of the reader of a table: the states read so far, and the lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
