@@ -201,7 +201,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
     (
         "time history", 0.37, {},
         FrozenAnswer(
-            basis="modal", recommended=RoundedPair(tr=0.158046, td=0.37, residual=0.605), tr_half_width=3.2e-05,
+            basis="modal", recommended=RoundedPair(tr=0.158046, td=0.37, residual=0.605), tr_half_width=8e-06,
             better_pair=RoundedPair(tr=0.119338, td=0.372005, residual=0.616),
             candidates=32, admissible=31, next_tr=(0.123033, 0.12079, 0.0928778),
             windows=(),
@@ -212,7 +212,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.19485, td=0.3, residual=0.798),
-            tr_half_width=0.00018,
+            tr_half_width=4.6e-05,
             better_pair=RoundedPair(tr=0.196797, td=0.296, residual=0.682),
             candidates=7,
             admissible=7,
@@ -264,7 +264,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.0167024, td=0.8, residual=1.005),
-            tr_half_width=0.0027,
+            tr_half_width=0.00069,
             better_pair=RoundedPair(tr=0.0170594, td=0.79952, residual=1.003),
             candidates=10,
             admissible=2,
@@ -277,7 +277,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.00524295, td=0.8, residual=0.994),
-            tr_half_width=0.00074,
+            tr_half_width=0.00018,
             better_pair=RoundedPair(tr=0.367976, td=0.796719, residual=0.908),
             candidates=22,
             admissible=3,
@@ -290,7 +290,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.367798, td=0.8, residual=0.981),
-            tr_half_width=0.00074,
+            tr_half_width=0.00018,
             better_pair=RoundedPair(tr=0.367983, td=0.796719, residual=0.908),
             candidates=19,
             admissible=2,
@@ -303,7 +303,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.44909, td=0.77, residual=0.79),
-            tr_half_width=0.00074,
+            tr_half_width=0.00018,
             better_pair=RoundedPair(tr=0.449381, td=0.769108, residual=0.799),
             candidates=14,
             admissible=2,
@@ -329,7 +329,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         FrozenAnswer(
             basis="modal",
             recommended=RoundedPair(tr=0.628692, td=0.8, residual=0.892),
-            tr_half_width=0.0048,
+            tr_half_width=0.0012,
             better_pair=RoundedPair(tr=0.629077, td=0.79952, residual=0.889),
             candidates=2,
             admissible=2,
@@ -359,12 +359,12 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
         "planar box, glstat", 0.37, {},
         FrozenAnswer(
             basis="modal",
-            recommended=RoundedPair(tr=0.170676, td=0.37, residual=0.572),
-            tr_half_width=0.00025,
-            better_pair=RoundedPair(tr=0.170676, td=0.37, residual=0.572),
+            recommended=RoundedPair(tr=0.123679, td=0.37, residual=0.604),
+            tr_half_width=6.3e-05,
+            better_pair=RoundedPair(tr=0.123679, td=0.37, residual=0.604),
             candidates=6,
             admissible=6,
-            next_tr=(0.123679, 0.222926, 0.27837),
+            next_tr=(0.170676, 0.222926, 0.27837),
             windows=(),
         ),
     ),
