@@ -1,4 +1,4 @@
-"""The command line as a program: ``d2rpick`` and ``python -m d2rpick``."""
+"""Start the command line: the program ``d2rpick``, which ``python -m d2rpick`` starts too."""
 
 import gc
 import os
@@ -9,27 +9,27 @@ import sys
 def main() -> None:
     """Run the command line.
 
-    One thread for linear algebra, unless the environment says otherwise: the systems solved here are small, and
-    starting the others costs a quarter of numpy's import.  Garbage is looked for less often, and not at the end: of
-    what imports make none is garbage, and looking for it costs a seventh of a run on an ordinary file.
+    Linear algebra uses one thread, unless the environment sets another number. The systems solved here are small, and
+    starting more threads takes a quarter of the time of numpy's import.
 
-    An interrupt leaves as KeyboardInterrupt, without a traceback: Python then ends itself by SIGINT, and the shell ends
-    its loop.  A shell goes on with its loop after a program that caught the signal and ended with any exit code.
+    Garbage is collected less often, and not at the end. Imports create no garbage, and searching for it takes a seventh
+    of the time of a run with an ordinary file.
+
+    An interrupt is raised as KeyboardInterrupt, without a traceback, so that Python ends itself by SIGINT. A shell then
+    ends its loop. It would continue its loop after a program that catches the signal and returns an exit code.
     """
     interrupts: list[int] = []
 
     def interrupt(number: int, _: object) -> None:
-        """Raise KeyboardInterrupt, and remember the signal, since library code may swallow the error."""
+        """Raise KeyboardInterrupt, and remember the signal, because a library may swallow the error."""
         interrupts.append(number)
-        sys.unraisablehook = lambda _: (
-            None
-        )  # what is swallowed in the end of an object would print a traceback
+        # An error that is swallowed while an object is deleted would print a traceback.
+        sys.unraisablehook = lambda _: None
         raise KeyboardInterrupt
 
     try:
-        if (
-            signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        ):  # background jobs ignore interrupts
+        # A background job has another handler, because it ignores interrupts.
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, interrupt)
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(100_000)
@@ -41,19 +41,18 @@ def main() -> None:
         interrupts.append(signal.SIGINT)
     finally:
         if signal.getsignal(signal.SIGINT) is interrupt:
-            signal.signal(
-                signal.SIGINT, signal.SIG_DFL
-            )  # the next one ends the program at once
-        gc.freeze()  # the system takes back what is left
+            # The next interrupt ends the program at once.
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+        gc.freeze()  # The system frees the memory anyway.
         if interrupts:
             sys.excepthook = lambda *_: None
             raise KeyboardInterrupt
 
 
 def _fill_closed_streams() -> None:
-    """Put something in the place of closed streams: a file opened there would get what is meant for them.
+    """Replace closed standard streams, so that no file gets their number and thus their output.
 
-    To write to a standard output that was closed is an error; a closed stderr loses only messages.
+    Writing to a closed standard output is an error. If stderr is closed, only messages are lost.
     """
     for stream in range(3):
         try:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import d2rpick as d2
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
@@ -16,6 +17,7 @@ from tests.command import ROOT, put, run_json
 from tests.energies import require
 
 KEPT = ROOT / "sample_data"
+EXCEL = KEPT / "rollover_box_excel.csv"
 NAMES = (*(f"rollover_box.{suffix}" for suffix in ("csv", "h5", "glstat", "matsum", "binout")), "rollover_boxT01",
          *(f"rollover_box.{suffix}" for suffix in ("d3plot", "d3thdt")))  # fmt: skip
 LARGEST = 320_000  # largest sample [bytes]
@@ -96,3 +98,19 @@ def test_one_run_has_one_answer_in_every_file_of_its_parts(name: str) -> None:
         0.0865, abs=sample_box.INTERVAL
     )
     assert suggestion["flight"]["end"] == pytest.approx(0.379, abs=sample_box.INTERVAL)
+
+
+def test_the_table_from_excel_shows_gravity_if_it_contains_the_mass(
+    tmp_path: Path,
+) -> None:
+    """docs/how-to/recipes.md says so: without the mass, a constant force may be any load."""
+    head, *rows = EXCEL.read_text("utf-8").splitlines()
+    with_mass = tmp_path / "with_mass.csv"
+    with_mass.write_text(
+        "\n".join([f"{head};Mass [kg]", *(f"{row};356" for row in rows)])
+    )
+    verdicts = [
+        require(d2.suggest(d2.read(str(path))).decision).verdict
+        for path in (EXCEL, with_mass)
+    ]
+    assert verdicts == ["do not use", "use with care"]

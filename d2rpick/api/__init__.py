@@ -1,4 +1,4 @@
-"""Offer the questions and answers of d2rpick: the names that ``import d2rpick`` exports and the commands call.
+"""Export the names that ``import d2rpick`` offers and the commands call: questions about runs, and their answers.
 
 A name is imported when it is first used.  Type checkers and editors find the names in the stub
 ``d2rpick/__init__.pyi``.
@@ -6,7 +6,7 @@ A name is imported when it is first used.  Type checkers and editors find the na
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # importing typing would slow down start-up
+TYPE_CHECKING = False  # Importing typing would slow down start-up.
 if TYPE_CHECKING:
     from typing import Any
 

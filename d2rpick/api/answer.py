@@ -1,4 +1,4 @@
-"""Define what all answers have in common: JSON, table, page, and the command line that repeats them."""
+"""Define what all answers have in common: JSON, table, page, and the command line that repeats the answer."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Answer:
     come from no file are written as ``<weights in memory>``.
     """
 
-    # some answers store this as a field, others compute it as a property
+    # Some answers store the command as a field, others compute it as a property.
     if TYPE_CHECKING:
 
         @property
@@ -45,7 +45,7 @@ class Answer:
 
     cautions: tuple[Caution, ...]
     kind: ClassVar[str]  # name of the answer in the table of output forms
-    # names of the attributes that the short form shows
+    # Names of the attributes that the short form of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -117,10 +117,10 @@ class Paged(Answer):
     def page(
         self,
         command: Sequence[str],
-        judging: Sequence[str] = (),  # noqa: ARG002
-        cards: Cards | None = None,  # noqa: ARG002
+        judging: Sequence[str] = (),  # noqa: ARG002  subclasses use the argument
+        cards: Cards | None = None,  # noqa: ARG002  subclasses use the argument
     ) -> str:
-        """Return the page. ``command`` is the command line that repeats it.
+        """Return the page; ``command`` is the command line that repeats it.
 
         With the options ``judging``, the command ``card`` gives the same verdicts.
         """
@@ -147,7 +147,7 @@ class RunAnswer(Paged):
 
     @property
     def run(self) -> Run:
-        """The run that was asked about."""
+        """The run about which the question was asked."""
         return self.question.run
 
     @property
@@ -222,7 +222,7 @@ class RunAnswer(Paged):
 
 def write_page(path: arguments.Path, page: str) -> Path:
     """Write a page and return its path."""
-    from pathlib import Path  # imported here to start faster
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     from d2rpick.api import arguments
 

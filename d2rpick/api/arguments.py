@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
-    Deck = (
-        Path | Literal[False]
-    )  # False means no deck, even if one is in the folder of the run
+    # False means no deck, even if there is one in the folder of the run.
+    Deck = Path | Literal[False]
     Parts = str | int | Iterable[str | int]
     # A number in the unit of the run, or a string with a unit, such as 64ms.
     Time = float | str
 
-_LONGEST_SHOWN: Final = 60  # largest number of characters of a wrong value in a message
+# largest number of characters of a wrong value that a message shows
+_LONGEST_SHOWN: Final = 60
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
@@ -47,7 +47,7 @@ def check_number(name: str, value: object, limits: Number = TIME) -> float:
         raise TypeError(
             f"{name} is {_format_wrong_value(value)}, a number was expected{suggest_without_unit(value)}"
         )
-    converted = float(value)  # type: ignore[arg-type]
+    converted = float(value)  # type: ignore[arg-type]  # is_number() excludes other types
     if not math.isfinite(converted):
         raise ValueError(f"{name} is {converted}, a finite number was expected")
     if limit := limits.missed(converted):
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Return a hint on how to write a number that has a decimal comma; empty for other strings.
+    """Explain how to write a number that has a decimal comma; empty for other strings.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Return a hint on how to write a time that has a unit; empty for other strings."""
+    """Explain how to write a time that has a unit; empty for other strings."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -175,7 +175,7 @@ def check_time_window(name: str, value: object) -> tuple[float, float] | None:
         raise TypeError(
             f"{name} is {_format_wrong_value(value)}, a pair of times was expected"
         )
-    first, last = list(value)  # type: ignore[call-overload]
+    first, last = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     times = check_number(f"{name}[0]", first), check_number(f"{name}[1]", last)
     if not times[0] < times[1]:
         raise ValueError(
@@ -207,9 +207,8 @@ def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         return ()
     from d2rpick.histories.names import Part
 
-    single = isinstance(value, str | int | Part) or is_whole_number(
-        value
-    )  # a Part has a number and a title
+    # A Part has a number and a title.
+    single = isinstance(value, str | int | Part) or is_whole_number(value)
     if single:
         listed = [value]
     else:
@@ -292,9 +291,8 @@ def check_run(name: str, run: object) -> None:
     """Raise TypeError unless the argument is a run returned by `read`."""
     from d2rpick.api.tables import is_table
 
-    if not (
-        hasattr(run, "files") and hasattr(run, "overview")
-    ):  # imported here because the module of the class imports this module
+    # Imported here because the module of the class imports this module.
+    if not (hasattr(run, "files") and hasattr(run, "overview")):
         if isinstance(run, str | os.PathLike):
             description = repr(run)
         else:
@@ -335,7 +333,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
     if kind == "flag":
         return check_flag(name, value, default)
     if option.many:
-        return list_part_names(name, value)  # type: ignore[arg-type]
+        return list_part_names(name, value)  # type: ignore[arg-type]  # the function checks the type
     if option.pair and isinstance(kind, range):
         return check_two_whole_numbers(name, value, kind.start)
     if option.pair:
@@ -354,7 +352,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
 
 
 def read_choosing(choosing: Choosing | Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a request that define how the times are chosen."""
+    """Return the fields of a request that determine how the times are chosen."""
     from d2rpick.api.choosing import Choosing as Arguments
 
     expected_names = Arguments.__annotations__
@@ -383,14 +381,15 @@ def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, in
         raise TypeError(
             f"{name} is {_format_wrong_value(value)}, a pair of numbers was expected"
         )
-    first, second = list(value)  # type: ignore[call-overload]
+    first, second = list(value)  # type: ignore[call-overload]  # _is_pair() excludes other types
     return check_whole_number(name, first, low), check_whole_number(name, second, low)
 
 
 def _check_oscillator(value: object) -> Oscillator | None:
     if value is None:
         return None
-    from d2rpick.vibration.oscillator import Oscillator  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.vibration.oscillator import Oscillator
 
     if not isinstance(value, Oscillator):
         raise TypeError(
@@ -405,7 +404,8 @@ def check_weights(value: object) -> Any:
         return None
     if isinstance(value, str | os.PathLike):
         return check_path("weights", value)
-    from d2rpick.choice.parts.cost import Weights  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.parts.cost import Weights
 
     if not isinstance(value, Weights):
         raise TypeError(
@@ -470,10 +470,10 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
-    """Return the windows of the rigid restart segments in a journal; the last segment with a number is used."""
-    import json  # imported here to start faster
+    """Return the windows of the rigid restart segments in a journal; of equal numbers, the last segment is used."""
+    import json  # Imported here to keep start-up fast.
 
-    # each segment as its number, True if it is rigid, its start and its end
+    # Each segment consists of its number, True if it is rigid, its start and its end.
     legs: list[tuple[int, bool, float, float]] = []
     for line in text.splitlines():
         try:
@@ -491,7 +491,7 @@ def _read_journal(text: str) -> list[tuple[float, float]]:
                     )
                 )
         except (ValueError, KeyError, TypeError):
-            continue  # an incomplete line, or a line with other content
+            continue  # The line is incomplete, or has other content.
     latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
     windows: list[tuple[float, float]] = []
     rigid_before = False

@@ -49,7 +49,7 @@ class RunQuestion(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    of_this_run: bool = True  # False if the deck was found to belong to another run
+    of_this_run: bool = True  # False if the deck was found to belong to another run.
 
     @property
     def deck(self) -> str | None:
@@ -66,9 +66,8 @@ class RunQuestion(NamedTuple):
     @property
     def options(self) -> tuple[str, ...]:
         """Options that follow the times in the command line that repeats the question."""
-        from d2rpick.report.tables import (
-            make_positional,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.report.tables import make_positional
 
         return (*self.request.asking(), *make_positional(self.request.history))
 
@@ -120,7 +119,7 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if the parts may be used only for the card, because the history is a table, which has no parts."""
+    """Return True if ``--part`` applies only to the card, because the history is a table, which has no parts."""
     return bool(request.energy) or not run.parts
 
 
@@ -165,7 +164,7 @@ def ask_run(
     if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # raises an error if both an energy and parts are named
+        request.selection()  # The call raises an error if both an energy and parts are named.
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
@@ -188,7 +187,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or only the weights; return None if neither is given.
+    """Read the deck with its weights, or only the weights; return None if neither is requested.
 
     Raises
     ------
@@ -210,7 +209,7 @@ def read_cost_model(request: Request) -> CostModel | None:
 def complete_selection(
     run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection: add the parts of the recommended set, and the springs of the deck that have energies.
+    """Complete a selection of parts: add the recommended set, and the springs of the deck that have energies.
 
     Raises
     ------
@@ -219,7 +218,6 @@ def complete_selection(
     """
     from d2rpick.choice.parts.deck_of_run import check_model_of_deck
     from d2rpick.choice.parts.sets_of_parts import recommend_parts
-    from d2rpick.deck.model import DISCRETE
 
     if foreign := check_model_of_deck(run, model.inventory):
         if has_recommended(selection.parts, run.parts):
@@ -227,10 +225,7 @@ def complete_selection(
                 f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
             )
         return selection
-    counts = model.inventory.counts
-    springs = {part.id for part in run.springs} | {
-        part for part, kinds in counts.items() if {*kinds} <= DISCRETE
-    }
+    springs = {part.id for part in run.springs} | model.inventory.springs
     parts = selection.parts
     if has_recommended(parts, run.parts):
         parts = tuple(map(str, recommend_parts(run, settings, model)))
@@ -251,7 +246,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
 
 
 def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
-    """Make the parts one rigid body, with a caution if they are not connected."""
+    """Make the parts one rigid body; add a caution if they are not connected."""
     from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts

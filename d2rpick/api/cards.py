@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.switched_run import Times
     from d2rpick.deck.printed_card import CardSolver as Module, PrintedCard, Printing
 
-# compiled at first use to start faster
+# This pattern is compiled at its first use, to keep start-up fast.
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
@@ -78,13 +78,13 @@ def _check_option(name: str, value: Any, option: Option) -> Any:
 
 def list_solvers() -> Sequence[str]:
     """Return the names of the solvers whose input can be printed."""
-    from d2rpick.deck.printing import SOLVERS  # imported here to start faster
+    from d2rpick.deck.printing import SOLVERS  # Imported here to keep start-up fast.
 
     return tuple(SOLVERS)
 
 
 def explain_unknown_solver(name: object) -> str:
-    """Return the message for a name that is no solver, with the most similar name of one."""
+    """Return the message for a name that is not a solver; it suggests the most similar name."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
@@ -110,7 +110,7 @@ class Cards:
         pair=True,
     )
     step_cap: float | None = make_option(
-        "Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT"
+        "Largest time step while the parts are rigid (DTMAX, /DTIX).", POSITIVE, "DT"
     )
     node: tuple[str, ...] = make_option(
         "Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True
@@ -132,7 +132,7 @@ class Cards:
 
     @classmethod
     def of(cls, arguments_of_card: CardOptions) -> Cards:
-        """Check the arguments of Python; raise TypeError or ValueError for a wrong one."""
+        """Check the arguments of a Python call; raise TypeError or ValueError for a wrong argument."""
         from d2rpick.api import arguments
 
         known_options = list_options(Cards)
@@ -148,15 +148,16 @@ class Cards:
 
     @classmethod
     def for_run(cls, run: Run, options: CardOptions) -> Cards:
-        """Check the arguments of Python; times with a unit are converted to the unit of the run."""
-        from d2rpick.api.times import TimeArguments  # imported here to start faster
+        """Check the arguments of a Python call; times with a unit are converted to the unit of the run."""
+        # Imported here to keep start-up fast.
+        from d2rpick.api.times import TimeArguments
 
         times = TimeArguments.of_run(run)
-        return cls.of(times.convert_options(options, list_options(Cards)))  # type: ignore[arg-type]
+        return cls.of(times.convert_options(options, list_options(Cards)))  # type: ignore[arg-type]  # the keys are the options of a card
 
     @property
     def given(self) -> list[str]:
-        """Names of the given options, without the solver."""
+        """Names of the given options, except the solver."""
         return [
             name
             for name in list_options(Cards)
@@ -164,7 +165,7 @@ class Cards:
         ]
 
     def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
-        """Return the options of the card with the given parts to switch."""
+        """Return the options of the card, completed by the given parts to switch."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_id_ranges("--node", self.node))
@@ -214,7 +215,7 @@ class Cards:
         return printing, notes
 
     def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the run's deck requires of a card, and notes on bodies that the deck lacks.
+        """Return what the deck of the run requires of a card, and notes on bodies that the deck lacks.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -255,12 +256,12 @@ class Cards:
         ), bodies.notes
 
 
-# Keys of the settings that apply to all commands. Other keys apply to the rules of check, or to one command.
+# Keys of the settings that apply to all commands; any other key applies to the rules, or to one command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
 def name_needed_argument(solver: Module) -> str:
-    """Return the name of the argument that lists what the card of ``solver`` switches."""
+    """Return the name of the argument that lists the parts or bodies on a card of ``solver``."""
     arguments_by_kind = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
@@ -307,7 +308,7 @@ class JudgedCard(NamedTuple):
 
     @property
     def verified(self) -> bool:
-        """True if all windows are verified."""
+        """True if all windows on the card are verified."""
         return all(verdict.verified for verdict in self.verdicts)
 
     @property
@@ -335,7 +336,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card of windows, and judge them with the times as printed: as in `verify`, or by ``judge``.
+    """Print the card of windows, and judge the windows with the times as printed: as in `verify`, or by ``judge``.
 
     Raises
     ------
@@ -371,7 +372,7 @@ def judge_and_print(
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Return the cautions of a card and of its verdicts, each once, and a caution for each failed verdict."""
+    """Return the cautions of a card and of its verdicts, each once, and a caution for each verdict that fails."""
     of_verdicts = (
         caution
         for verdict in card.verdicts
@@ -443,7 +444,7 @@ def card(
         times_of_windows,
         run,
         make_request(run, parts, None, None, None, judging),
-        Cards.of(arguments_of_card),  # type: ignore[arg-type]
+        Cards.of(arguments_of_card),  # type: ignore[arg-type]  # the keys are the options of a card
     )
 
 
@@ -456,7 +457,7 @@ def print_card(
     if run is None:
         request.without_history()
         return JudgedCard(print_cards(windows, _complete_alone(request, cards)))
-    from d2rpick.api.asked import ask_run  # imported here to start faster
+    from d2rpick.api.asked import ask_run  # Imported here to keep start-up fast.
 
     question = ask_run(run, request, card_alone=True)
     solver = cards.solver or find_solver(question.reference.history.format)

@@ -126,7 +126,7 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.asked import make_request  # imported here to start faster
+    from d2rpick.api.asked import make_request  # Imported here to keep start-up fast.
 
     names = arguments.list_paths("decks", decks)
     if history is not None:
@@ -164,14 +164,13 @@ def find_findings(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check the named decks, by a run if there is one."""
+    """Check the named decks, with the history of a run if one is given."""
     judge = None
     if run is None:
         request.without_history()
     else:
-        from d2rpick.rules.judgement import (
-            HistoryJudge,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.rules.judgement import HistoryJudge
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules = Configuration(select, ignore)
@@ -209,13 +208,12 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result of each deck once, of a run under its first file. A folder stands for its main decks."""
+    """Yield the result of each deck once, and of a run under its first file. A folder stands for its main decks."""
     visited: set[str] = set()
-    real_folder = cache(
-        os.path.realpath
-    )  # cached, because it asks the system for each parent folder
+    # The result is cached, because it asks the system for each parent folder.
+    real_folder = cache(os.path.realpath)
     configured = cache(
-        lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
+        lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118  pathlib is slow for many decks
     )
     found_by_name = {name: _list_decks(name) for name in dict.fromkeys(deck_names)}
     listed = [
@@ -233,8 +231,8 @@ def _check_each(
             folder, file = os.path.split(deck)
             real = (
                 os.path.realpath(deck)
-                if os.path.islink(deck)  # noqa: PTH114
-                else os.path.join(real_folder(folder), file)  # noqa: PTH118
+                if os.path.islink(deck)  # noqa: PTH114  pathlib is slow for many decks
+                else os.path.join(real_folder(folder), file)  # noqa: PTH118  pathlib is slow for many decks
             )
             if real not in visited and not any(
                 deck in legs for legs in restarts.values()
@@ -251,9 +249,9 @@ def _check_each(
 
 
 def _list_decks(name: str) -> list[str] | DeckError:
-    """Return the main decks in a folder, or the deck itself; an error for a folder without decks."""
+    """Return the main decks in a folder, or the deck itself; return an error for a folder without decks."""
     try:
-        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path fails on odd names
+        return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path.is_dir fails on some names
     except DeckError as error:
         return error
 
@@ -263,11 +261,11 @@ def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
-        folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
+        folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120  pathlib is slow for many decks
         neighbours = [
             deck
             for deck in decks
-            if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
+            if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120  pathlib is slow for many decks
         ]
         if len(neighbours) == 1 and not list_run_files(neighbours[0]):
             legs.setdefault(neighbours[0], []).append(restart)
@@ -281,7 +279,7 @@ def _check_one(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the configuration nearest to it; return an error in either, so that other decks are checked."""
+    """Check a deck by the configuration nearest to it. An error is returned, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)
@@ -295,5 +293,5 @@ def _check_one(
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # the error concerns the history, with which all decks are judged
+            raise  # The error concerns the history, by which all decks are judged.
         return Unreadable(name, error, (source,))

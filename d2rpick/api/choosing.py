@@ -1,4 +1,4 @@
-"""Define the keyword arguments for choosing and judging.
+"""Define the keyword arguments by which pairs are chosen and judged.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class JudgingOptions(TypedDict, total=False):
-    """How a pair is judged.  None stands for the default.
+    """Options that say how a pair is judged.  None stands for the default.
 
     Times have the unit of the history, or are strings with a unit, such as ``"64ms"``.
 
@@ -35,15 +35,15 @@ class JudgingOptions(TypedDict, total=False):
 
 
 class Choosing(JudgingOptions, total=False):
-    """How to choose and judge, like the options of ``d2rpick suggest``.  None stands for the default.
+    """Options that say how pairs are chosen and judged, as in ``d2rpick suggest``.  None stands for the default.
 
     ``fit_window``: window of time in which the oscillator is identified.  ``strict``: recommend nothing if only the
     energy shows when the load ends (default: False).  ``keep_vibration``: grade the vibration by the residual alone,
     even if the next contact has far more energy (default: False).  ``cost_share``: share of the cost of a time step
-    that the elements of the switched parts take, to predict the CPU time.  ``step_ratio``: ratio of the time step
-    while rigid to the one before, 1 or more (default: 1).  ``oscillator``: given instead of identified, with ``v0``.
-    ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy level alone,
-    without an oscillator (default: True).
+    that the elements of the switched parts take, to predict the CPU time.  ``step_ratio``: time step while the parts
+    are rigid, divided by the time step before, 1 or more (default: 1).  ``oscillator``: given instead of identified,
+    with ``v0``.  ``v0``: velocity of the frame of ``oscillator`` at time 0.  ``replay``: False: judge by the energy
+    level alone, without an oscillator (default: True).
     """
 
     fit_window: tuple[float | str, float | str] | None

@@ -42,7 +42,7 @@ class PartTable(Paged, sets_of_parts.Parts):
     kind = "parts"
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per part.
+        """Return a table with a row for each part.
 
         The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
 
@@ -59,7 +59,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def sets_frame(self) -> pd.DataFrame:
-        """Return a table with a row per set; the columns are the keys of ``sets`` in the JSON."""
+        """Return a table with a row for each set; the columns are the keys of ``sets`` in the JSON."""
         from d2rpick.report.parts import SET
 
         return build_frame(
@@ -67,7 +67,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def plot(self) -> Figure:
-        """Draw the energies of the parts with the largest energy, and the flights."""
+        """Draw the energies of the parts that have the largest energies, and the flights."""
         from d2rpick.report.figures_choice import draw_parts
 
         return draw_parts(self)
@@ -83,7 +83,7 @@ def parts(
     td: Time | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Determine which parts of a run may be switched and the savings of sets, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def parts(
 def compare_parts(
     run: Run, request: Request, tr: float | None, td: float | None
 ) -> PartTable:
-    """Determine which parts may be switched; compare sets of them from tr to td, or up to td."""
+    """Determine which parts may be switched, and compare sets of them in a window that ends at td."""
     times = check_times(tr, td)
     model = read_cost_model(request)
     deck_names = [request.deck] if request.deck else []

@@ -24,7 +24,7 @@ def find_deck_in_folder(request: Request) -> Request:
     folder = request.folder
     if folder is None:
         return request
-    from d2rpick.deck import find_decks_of_run  # imported here to start faster
+    from d2rpick.deck import find_decks_of_run  # Imported here to keep start-up fast.
 
     decks = find_decks_of_run(folder)
     if len(decks) > 1:

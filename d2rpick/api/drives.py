@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
     from d2rpick.running.sequence import Leg
 
-# shortest time between td and a contact [s]
+# Shortest time between td and the next contact [s].
 _SHORTEST = 2e-3
-# cost of a cycle with rigid parts relative to a cycle without, if the deck does not determine it
+# Assumed cost of a cycle with rigid parts relative to a cycle without, if the deck does not determine it.
 _UNKNOWN = 0.5
 
 
@@ -45,17 +45,17 @@ class Drive(Paged, Driven):
     def page(
         self,
         command: Sequence[str],
-        judging: Sequence[str] = (),  # noqa: ARG002
-        cards: Cards | None = None,  # noqa: ARG002
+        judging: Sequence[str] = (),  # noqa: ARG002  other answers use the argument
+        cards: Cards | None = None,  # noqa: ARG002  other answers use the argument
     ) -> str:
-        """Return the page."""
+        """Return the page about the run."""
         from d2rpick.report.pages import drive_page
 
         return drive_page(self, command)
 
 
 class Driving:
-    """A run that is started or resumed by ``d2rpick drive``; times in the unit of the deck.
+    """A run that ``d2rpick drive`` starts or resumes; its times are in the unit of the deck.
 
     Raises
     ------
@@ -133,7 +133,7 @@ class Driving:
                 raise D2RPickError(
                     f"{folder}: the folder is not empty; choose another one"
                 )
-            if not computed:  # the user may have corrected the deck or the command
+            if not computed:  # The user may have corrected the deck or the command.
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)
                 journal.add("begun", deck=digest)
@@ -202,7 +202,7 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the saved share of the CPU time; None if it is unknown.
+    """Return the saved share of the CPU time of the run; None if it is unknown.
 
     A run without switching is assumed to cost the mean of the deformable segments throughout.
     """

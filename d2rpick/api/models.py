@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-# largest number of states; a longer text would have several gigabytes
+# Largest number of states of an oscillator history; a longer text would have several gigabytes.
 MOST_REPLAYED = 10_000_000
 HISTORIES = (
     "csv",
     "hdf5",
     "glstat",
     "matsum",
-)  # formats of d2rpick.report.history_files, which --help does not import
+)  # Formats of d2rpick.report.history_files, which --help does not import.
 
 MOST_STATES = 1_000_000
 PARAMETERS = (
@@ -44,24 +44,23 @@ PARAMETERS = (
     "tilt",
     "ground_stiffness",
 )
-TD = 0.37  # td of the published study, 10 ms before the ground contact [s]
-TILT = 30.0  # tilt of a falling box [degrees]: it lands on an edge and tumbles
-T_END = {
-    False: 0.42,
-    True: 1.2,
-}  # end time [s], long enough for some bounces; the key is True for a dropped box
-# largest energy imbalance of a run, relative to the largest total energy [-]
+TD = 0.37  # default td, which is 10 ms before the ground contact of the published study [s]
+# tilt of a falling box, with which it lands on an edge and tumbles [degrees]
+TILT = 30.0
+# End time of the simulation [s]; the key is True for a dropped box.
+T_END = {False: 0.42, True: 1.2}
+# Largest energy imbalance of a run, relative to its largest total energy [-].
 BALANCED = 0.01
 
 
 def _copy_option(name: str, **changes: Any) -> Any:
-    """Return an option of a request with changes for this table."""
+    """Return an option of a request with some changes for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Request for a motion of the oscillator: its parameters, its initial state, and when it is rigid."""
+    """Request for a motion of the oscillator: its parameters, its initial state, and its rigid windows."""
 
     stiffness: float = _copy_option("stiffness")
     mass: float = _copy_option("mass")
@@ -122,7 +121,7 @@ class Motion:
 
     @property
     def start(self) -> State:
-        """The state at time 0."""
+        """The state of the oscillator at time 0."""
         from d2rpick.vibration.oscillator import State
 
         values = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
@@ -136,9 +135,8 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        assert (
-            oscillator is not None
-        )  # the command line always has a complete oscillator, because click requires its options
+        # On the command line the oscillator is always complete, because click requires its options.
+        assert oscillator is not None
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
@@ -249,7 +247,7 @@ class Box:
 
     @property
     def parameters(self) -> Parameters:
-        """The parameters of the model."""
+        """The parameters of the box model."""
         from d2rpick.models.box_model import Parameters
 
         values = {
@@ -276,7 +274,7 @@ class Box:
         )
 
     def simulated(self, *rigid: RigidWindow) -> Record:
-        """Compute the run with these windows."""
+        """Compute the run of the box with these windows."""
         from d2rpick.models.box_run import simulate
 
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
@@ -304,7 +302,7 @@ def _check_windows(
 
 
 class Scanning:
-    """A scan to be computed: the reference run, the recommendation from it, and the other values of tr."""
+    """A scan to be computed: the reference run, the recommendation from this run, and the other values of tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -327,7 +325,7 @@ class Scanning:
             self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs; ``told`` is called with the number of finished runs."""
+        """Compute the runs of the scan; ``told`` is called with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 
@@ -342,7 +340,7 @@ class Scanning:
 
 
 def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Return a caution if the energy of a run is not balanced, for example if damping acts within a few time steps."""
+    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few time steps."""
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()

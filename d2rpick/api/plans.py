@@ -45,7 +45,7 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
     @property
     def answer(self) -> str:
-        """The result in one sentence."""
+        """The result of the exploration in one sentence."""
         from d2rpick.report.trade_off import give_answer
 
         return give_answer(self)
@@ -189,7 +189,7 @@ class Plan(RunAnswer, planning.RunPlan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card for the next run, and judge its windows with the times as printed.
+        """Print the card for the next run, and judge the windows with the times as printed.
 
         It contains all new windows if ``every`` is True, else only the windows that the history supports.
         """
@@ -210,7 +210,7 @@ class Plan(RunAnswer, planning.RunPlan):
     def page(
         self,
         command: Sequence[str],
-        judging: Sequence[str] = (),  # noqa: ARG002
+        judging: Sequence[str] = (),  # noqa: ARG002  other answers use the argument
         cards: Cards | None = None,
     ) -> str:
         """Return the page, with the cards of the next run."""
@@ -310,9 +310,8 @@ def plan_for_question(
         )
     windows: Sequence[Times] = ()
     if done:
-        from d2rpick.deck.printed_card import (
-            refuse_overlapping_windows,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.printed_card import refuse_overlapping_windows
 
         windows = refuse_overlapping_windows(done)
     earlier = (
@@ -326,9 +325,8 @@ def plan_for_question(
         before=earlier,
     )
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
-    times += (
-        ["--done", "-"] if windows else []
-    )  # one line for each window, in the form that `check` reads from standard input
+    # The text has one line for each window, in the form that `check` reads from standard input.
+    times += ["--done", "-"] if windows else []
     times += [
         text
         for name in (before.sources if before else ())
@@ -349,7 +347,7 @@ def write_planned_deck(
     from d2rpick.rules.judgement import HistoryJudge
 
     question = plan.question
-    # windows with the times that the card prints
+    # The copy of the deck contains only the windows whose times are on the card.
     done = card.card.windows[: len(plan.done)]
     names = write_deck(
         question.request.deck or "", card.card, folder, overwrite=overwrite

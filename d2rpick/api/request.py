@@ -1,4 +1,4 @@
-"""Define everything that can be asked about a run in one table.
+"""Define in one table everything that a user can ask about a run.
 
 The fields of `Request` determine the options of the command line with their environment variables, the keyword
 arguments of Python, and the command line that repeats an answer.
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
-    # smallest mean energy relative to the reference run; well-switched computed runs had at least 0.77
+    # Smallest mean energy relative to the reference run; well-switched computed runs had at least 0.77.
     0.7
 )
-# Options for reading a history, and the same options without the parts, which a deck defines itself.
+# Options for reading a history; a deck that is checked defines its parts itself.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
@@ -54,8 +54,8 @@ ADVANCED: Final = (
 )
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
-# Placeholder for weights without a file.
-# Such a command line is refused, so that it never runs with other weights.
+# Placeholder for weights that do not come from a file.
+# A command line that contains this placeholder is refused, because it cannot repeat the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -65,7 +65,7 @@ def _make_oscillator_option(text: str, kind: Number = POSITIVE, *others: str) ->
 
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ReadingOptions:
-    """Selection of a run, and how its files are read."""
+    """The files of a run, and how they are read."""
 
     deck: str | None = make_option(
         "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
@@ -74,7 +74,7 @@ class ReadingOptions:
         "Use no deck.  [default: the main deck in HISTORY, if that is a folder]",
         *("flag",), default=False, instead_of=("deck",),
     )  # fmt: skip
-    weights: str | Weights | None = make_option(  # noqa: RUF009
+    weights: str | Weights | None = make_option(  # noqa: RUF009  the default is a description that is never changed
         "File with the cost of an element by formulation, from d2rpick calibrate.  [default: measured with "
         "OpenRadioss]",
         *("file", "FILE"),
@@ -107,11 +107,11 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# Not frozen although it is never changed, like other tables of options.
-# Frozen classes cost each command 2 % of its start.
+# The class is never changed, but it is not frozen, like other tables of options.
+# A frozen class would cost each command 2 % of its start-up time.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
-    """A question about a run, times in the unit of the history; contradictions raise ArgumentError.
+    """A question about a run with times in the unit of the history; contradictions raise ArgumentError.
 
     ``given`` names the options that were given, also those given with their default value.
     """
@@ -134,7 +134,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    run_folder: str | None = None  # folder of a run whose files are named in `history`
+    run_folder: str | None = None  # folder of the run whose files `history` names
     deck_in_folder: bool = False  # True if `deck` was found in the folder of the run
     given: Collection[str] | None = None
 
@@ -164,13 +164,13 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def folder(self) -> str | None:
-        """The folder of the run, searched for its main deck; None if a deck is named or excluded."""
+        """The folder of the run, in which its main deck is searched for; None if a deck is named or excluded."""
         import os
 
         if self.deck is not None or self.no_deck:
             return None
         name = self.history[0] if len(self.history) == 1 else ""
-        return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  odd names
+        return self.run_folder or (name if os.path.isdir(name) else None)  # noqa: PTH112  Path.is_dir fails on some names
 
     def check_deck(self) -> None:
         """Refuse options that need a deck if no deck is given."""
@@ -204,7 +204,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def oscillator(self) -> Oscillator | None:
-        """The given oscillator."""
+        """The oscillator that the options define."""
         if self.stiffness is None or self.mass is None or self.alpha is None:
             return None
         from d2rpick.vibration.oscillator import Oscillator
@@ -218,18 +218,17 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def settings(self) -> Settings:
-        """The settings for choosing and judging."""
+        """The settings for choosing and judging pairs."""
         from d2rpick.choice.question import Settings
 
         mode = None
         oscillator = self.oscillator
         if oscillator is not None and self.v0 is not None:
-            from d2rpick.vibration.oscillator import (
-                to_mode,
-            )  # imported here to start faster
+            # Imported here to keep start-up fast.
+            from d2rpick.vibration.oscillator import to_mode
 
             mode = to_mode(oscillator, self.v0)
-        # options without a value keep the defaults of the settings
+        # Options without a value keep the defaults of the settings.
         chosen = {
             name: getattr(self, name)
             for name in _USES
@@ -238,7 +237,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return Settings(**chosen, oscillator=mode, replay=not self.no_verify)
 
     def selection(self, *, parts: bool = True) -> Selection:
-        """Return the selected columns and, with ``parts``, parts; raise ArgumentError if energies are given twice."""
+        """Return the selected columns and, with ``parts``, the selected parts; refuse energies that are given twice."""
         from d2rpick.histories.names import Selection
 
         if parts and self.energy and self.part:
@@ -251,7 +250,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
-        """Return the given options, or only those in ``names``, as typed after a td on the command line."""
+        """Return the given options, or only the options in ``names``, as typed after a td on the command line."""
         chosen = list(self._given())
         if names is not None:
             chosen = [name for name in chosen if name in names]
@@ -262,14 +261,14 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` use the same history as judge."""
+        """Return the options with which ``card`` and ``check`` judge by the same history."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def without_history(self) -> None:
-        """Refuse options for judging if there is no history to judge by."""
+        """Refuse options for judging if there is no history by which to judge."""
         if lost := [
             name
             for name in self._given()
@@ -290,7 +289,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
 
 def write_option(name: str, value: Any, *, many: bool) -> Iterator[str]:
-    """Yield the words of an option and its value as typed; ``many`` is True if it has several values."""
+    """Yield the words of an option and its value as typed; ``many`` is True if the option has several values."""
     if isinstance(value, bool):
         yield from (f"--{make_option_name(name)}",) * value
         return

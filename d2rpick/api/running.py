@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class FirstRun(NamedTuple):
-    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on unknown facts.
+    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what is unknown.
 
     ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """
@@ -139,13 +139,13 @@ def follow(
     >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
-    from d2rpick.running import watch  # imported here to start faster
+    from d2rpick.running import watch  # Imported here to keep start-up fast.
 
     selection = Selection(parts=arguments.list_part_names("parts", parts))
     inventory = None
     main = None if deck is None else arguments.check_path("deck", deck)
     if main is not None:
-        from d2rpick.deck import read_inventory  # imported here to start faster
+        from d2rpick.deck import read_inventory  # Imported here to keep start-up fast.
 
         inventory = read_inventory(main)
     time = TimeArguments.of_deck(main).check_time("wait", wait)

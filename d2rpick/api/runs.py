@@ -1,4 +1,4 @@
-"""Provide runs for scripts: read from files or from memory, or taken from a table."""
+"""Provide runs for scripts, from files, from memory, or from a table."""
 
 from __future__ import annotations
 
@@ -86,12 +86,12 @@ class Run:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with their own histories: ``id`` and ``title``."""
+        """Parts with their own histories; each has an ``id`` and a ``title``."""
         return self.files.parts
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on omissions and assumptions of the readers."""
+        """Notes of the readers on what they omitted and assumed."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
@@ -162,7 +162,7 @@ class Run:
             columns = {
                 part.name: energies[:, at] for at, part in enumerate(history.parts)
             }
-            # the energies of the parts and their sum have the same times
+            # The energies of the parts and their sum have the same times.
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
             "source": list(history.source),
@@ -235,7 +235,7 @@ def find_folder(names: Sequence[str]) -> str | None:
     """Return the folder if the run was given as a folder; None if it was given as files."""
     import os
 
-    return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
+    return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  Path.is_dir fails on some names
 
 
 def from_frame(
@@ -373,7 +373,7 @@ def make_selection(
         or not hasattr(energy, "__iter__")
         or arguments.is_number(energy)
     )
-    listed: list[Any] = ([] if energy is None else [energy]) if single else list(energy)  # type: ignore[arg-type]
+    listed: list[Any] = ([] if energy is None else [energy]) if single else list(energy)  # type: ignore[arg-type]  # a single energy is not iterated
     if channels is not None and not isinstance(channels, Mapping):
         raise TypeError(
             f"channels is {channels!r}, a mapping of quantities to columns was expected"
@@ -406,7 +406,7 @@ def make_selection(
 def extract_columns(
     run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Return the selected columns of a run with all quantities known at its times, and notes on them.
+    """Return the selected columns of a run, all quantities known at their times, and notes on these quantities.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum that shows the flight, each of shape (n,).

@@ -1,4 +1,4 @@
-"""Ask the same question of many runs. A file with a line for each judged run allows a study to be resumed."""
+"""Ask the same question about many runs. A file with a line for each judged run allows a study to be resumed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # first words of the summary below the rows
+_LAST: Final = b'{"schema": '  # beginning of the summary line below the rows
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -84,7 +84,7 @@ def study(
     jobs: int | None = 1,
     **choosing: Unpack[Choosing],
 ) -> Study:
-    """Ask the same question of many runs, as ``d2rpick study`` does.
+    """Ask the same question about many runs, as ``d2rpick study`` does.
 
     Parameters
     ----------
@@ -146,18 +146,18 @@ def study(
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:
-    """Replace patterns with the files and folders that they match, each of them a run. Other names are kept."""
+    """Replace patterns with the files and folders that they match, each of which is a run. Other names are kept."""
     from glob import glob
 
     runs: list[str] = []
     for name in names:
         pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        runs += (pattern and _remove_repeated(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+        runs += (pattern and _remove_repeated(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path.glob drops "./"
     return tuple(runs)
 
 
 def _remove_repeated(names: Iterable[str]) -> list[str]:
-    """Return each file or folder once, by its shortest name: circular links give it many names."""
+    """Return each file or folder once, by its shortest name, because circular links give it many names."""
     shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
@@ -165,7 +165,7 @@ def _remove_repeated(names: Iterable[str]) -> list[str]:
 def make_question(
     request: Request, td: float | tuple[float, float] | None, *, curve: bool
 ) -> Question:
-    """Return the question to ask of every run; ``curve`` is True if the energies of all runs are drawn."""
+    """Return the question to ask about every run; ``curve`` is True if the energies of all runs are drawn."""
     return Question(
         td, request.settings, request.selection(), request.input_format, curve=curve
     )
@@ -174,12 +174,12 @@ def make_question(
 def answer_study(
     request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]
 ) -> Study:
-    """Compare the rows of all runs."""
+    """Compare the answers for all runs."""
     td = question.td
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
-    # a study reports no CPU time, so its command omits these options
+    # A study reports no CPU time, so its command omits these options.
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
         core.compare_rows(td, rows),
@@ -218,7 +218,7 @@ def compute_rows(
     following = 0
     names = [sources[number] for number in new]
     if absolute:
-        names = [abspath(name) for name in names]  # noqa: PTH100
+        names = [abspath(name) for name in names]  # noqa: PTH100  Path.resolve would follow links
     for answer in chain(
         (None,), farm.answers(partial(core.judge_run, question), names)
     ):
@@ -240,7 +240,7 @@ def compute_rows(
 
 
 def compute_fingerprint(question: Question) -> str:
-    """Return a digest of everything that affects a row besides its files: options and version, not curves."""
+    """Return a digest of everything that affects a row besides its files: the options and the version."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -288,12 +288,11 @@ class Ledger:
                 f"{name}: cannot be written (not a regular file); give another file"
             )
         try:
-            with Path(name).open(
-                "a+b"
-            ) as file:  # fails before the work begins if the file is not writable
+            # Opening the file fails before the work begins if the file is not writable.
+            with Path(name).open("a+b") as file:
                 file.seek(0)
                 content = file.read()
-            if new:  # the first row creates the file
+            if new:  # The file is deleted, because the first row creates it again.
                 Path(name).unlink()
         except OSError as error:
             raise FormatError(
@@ -307,9 +306,8 @@ class Ledger:
             if record := parse_record(text):
                 self._remember(record)
             else:
-                cut = text.startswith(_FIRST) and not text.endswith(
-                    b"}"
-                )  # the incomplete last line that a killed study leaves
+                # A killed study leaves an incomplete last line.
+                cut = text.startswith(_FIRST) and not text.endswith(b"}")
                 self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
@@ -331,7 +329,7 @@ class Ledger:
             )
 
     def find(self, source: str) -> StudyRow | None:
-        """Return the row of a run whose files are unchanged, None if there is none."""
+        """Return the stored row of a run whose files are unchanged; None if there is none."""
         files = stamp_files(source)
         row = self._rows.get(files)
         if row:
@@ -350,7 +348,7 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Say how many of ``runs`` runs are taken from the file, and why other rows were not used."""
+        """Say how many of ``runs`` runs are taken from the file, and why other stored rows are not used."""
         if self.outdated:
             outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:
@@ -362,12 +360,9 @@ class Ledger:
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:
-        """Append the row of a judged run; the file contains it when this method returns."""
-        if row.status in (
-            FAILED,
-            UNREADABLE,
-            INTERNAL_ERROR,
-        ):  # a row that is not stored is computed again next time
+        """Append the row of a judged run; the file contains the row when this method returns."""
+        # A row that is not stored is computed again next time.
+        if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):
             return
         try:
             append_as_a_whole(

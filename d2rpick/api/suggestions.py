@@ -1,4 +1,4 @@
-"""Choose the switch times tr and td, and judge a given pair."""
+"""Choose the switch times tr and td, and judge a given pair of them."""
 
 from __future__ import annotations
 
@@ -312,7 +312,7 @@ def verify(
 
 
 def check_pair(tr: float | None, td: float | None, switched: object) -> None:
-    """Refuse an incomplete pair: both times are needed unless a switched run gives them."""
+    """Refuse an incomplete pair; both times are needed unless a switched run defines them."""
     if not switched and (tr is None or td is None):
         raise ArgumentError(
             f"give `{'tr' if tr is None else 'td'}` too, or a finished switched run"
@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, which gives the times that are not given."""
+    """Judge a pair, also by a finished switched run, which defines the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

@@ -30,7 +30,7 @@ def is_table(value: Any) -> bool:
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if kind:
         return hasattr(value, "ndim") and kind not in "OUST"
-    # look at the type, because reading the columns of a lazy frame would compute them
+    # Only the type is examined, because reading the columns of a lazy frame would compute them.
     return isinstance(value, Mapping) or any(
         hasattr(type(value), name) for name in _METHODS_OF_TABLES
     )
@@ -60,22 +60,21 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return table
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
-    # an object of xarray; only a DataArray has a name
+    # The table is an object of xarray; only a DataArray has a name.
     if hasattr(table, "to_dataframe"):
         if hasattr(table, "name"):
             frame = table.to_dataframe(name=_SERIES_NAME)
         else:
             frame = table.to_dataframe()
         return pd.DataFrame(frame)
-    if hasattr(table, "collect"):  # a lazy frame of polars
+    if hasattr(table, "collect"):  # The table is a lazy frame of polars.
         table = table.collect()
-    if hasattr(table, "columns") and hasattr(
-        table, "get_column"
-    ):  # polars, whose own conversion needs pyarrow
+    # The table is a frame of polars, whose own conversion needs pyarrow.
+    if hasattr(table, "columns") and hasattr(table, "get_column"):
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}
         )
-    if hasattr(table, "to_pandas"):  # tables of pyarrow and other libraries
+    if hasattr(table, "to_pandas"):  # The table comes from pyarrow or another library.
         frame = table.to_pandas()
         if isinstance(frame, pd.Series):
             return frame.to_frame(_SERIES_NAME)

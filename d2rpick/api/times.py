@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TimeUnit(NamedTuple):
-    """The unit of the times of a run, empty if it is unknown, and the source that should name it."""
+    """The unit of the times of a run, empty if it is unknown, and the file that should name it."""
 
     name: str
     source: str
@@ -48,26 +48,26 @@ class TimeArguments:
 
     @classmethod
     def of_deck(cls, deck: str | None) -> TimeArguments:
-        """Return a check that converts to the unit of a deck, which only Radioss decks name."""
+        """Return a check that converts times to the unit of a deck; only Radioss decks name a unit."""
         return cls(lambda: find_unit_of_deck(deck))
 
     @classmethod
     def of_run(cls, run: Run | None) -> TimeArguments:
-        """Return a check that converts to the unit of a run."""
+        """Return a check that converts times to the unit of a run."""
         return cls(lambda: find_unit_of_run(run))
 
     def check_time(
         self, name: str, value: object, limits: Number = TIME
     ) -> float | None:
-        """Return a finite time within its limits, or None if none is given."""
+        """Return a finite time within its limits; None if no time is given."""
         return arguments.check_optional_number(name, self.convert(name, value), limits)
 
     def check_window(self, name: str, value: object) -> tuple[float, float] | None:
-        """Return a window of time, the lower time first, or None if none is given."""
+        """Return a window of time, the lower time first; None if no window is given."""
         return arguments.check_time_window(name, self.convert(name, value))
 
     def check_windows(self, name: str, value: object) -> list[tuple[float, float]]:
-        """Return windows of time, none for None."""
+        """Return windows of time; None gives no windows."""
         if isinstance(value, Iterator):
             value = list(value)
         return arguments.check_windows(name, self.convert(name, value))
@@ -75,7 +75,7 @@ class TimeArguments:
     def convert_options(
         self, values: Mapping[str, Any], options: Mapping[str, Option]
     ) -> dict[str, Any]:
-        """Return the values of options by name, with those converted that are times."""
+        """Return the values of options by name; values that are times are converted."""
         return {
             name: self.convert(name, value)
             if name in options and options[name].is_time
@@ -84,7 +84,7 @@ class TimeArguments:
         }
 
     def convert(self, name: str, value: object) -> object:
-        """Return a value with each text that is a time with a unit replaced by a number, also in lists and tuples.
+        """Return a value in which each time with a unit is replaced by a number, also in lists and tuples.
 
         Raises
         ------
@@ -103,7 +103,7 @@ class TimeArguments:
 
 
 def is_time_with_unit(text: str) -> bool:
-    """Return True for a number with a unit of time after it.
+    """Return True for a string with a number followed by a unit of time.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def find_unit_of_deck(deck: str | None) -> TimeUnit:
     """
     if deck is None:
         return TimeUnit("", "the run, since no deck is given")
-    from d2rpick.deck import find_time_unit  # imported here to start faster
+    from d2rpick.deck import find_time_unit  # Imported here to keep start-up fast.
 
     return TimeUnit(find_time_unit(deck), deck)
 
@@ -158,7 +158,7 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the unit if there is only one, otherwise an empty string."""
+    """Return the only unit; empty if there is none, or several."""
     return next(iter(units)) if len(units) == 1 else ""
 
 

@@ -1,4 +1,4 @@
-"""Provide Python 3.12's ``cached_property`` for Python 3.11, whose own version takes a lock (3 % of a small check)."""
+"""Provide Python 3.12's ``cached_property`` for Python 3.11, whose own version takes a lock in each call."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING or sys.version_info >= (3, 12):
-    from functools import cached_property as cached_property  # noqa: PLC0414, TID251
+    from functools import cached_property as cached_property  # noqa: PLC0414, TID251  the name is exported
 else:
 
-    class cached_property:  # noqa: D101, N801  a copy of the one in functools
+    class cached_property:  # noqa: D101, N801  this class copies functools.cached_property
         def __init__(self, function):
             self._function, self.__doc__ = function, function.__doc__
 

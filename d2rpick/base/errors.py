@@ -11,7 +11,7 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-# Unicode categories that are escaped: control and format characters (escape codes, text direction), line separators.
+# Unicode categories that are escaped: control and format characters, and line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
 _MOST_NAMED: Final = 20  # largest number of names that one message lists
@@ -64,7 +64,7 @@ FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return the result of ``read``, or None if the data are missing in some state of the history."""
+    """Return the result of ``read``; return None if the files lack these data in some state."""
     try:
         return read()
     except FormatError:

@@ -21,28 +21,29 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 STDIN: Final = "-"  # file name that stands for standard input
-# Limits on a file, each with its default and its unit.
+# Limits on the content of a file, each with its default value and its unit.
 _BOUNDS: Final = {
     "RATIO": (
         100.0,
         "times as many bytes",
-    ),  # largest ratio of unpacked to packed size: a history unpacks to 3 to 30 times its packed size
+    ),  # largest ratio of unpacked to packed size; real histories have a ratio of 3 to 30
     # largest unpacked size [bytes], because unpacked data are kept in memory
     "UNPACKED": (4e9, "bytes"),
-    "LINE": (1e6, "bytes"),  # length [bytes] of a line with about 50,000 columns
+    "LINE": (
+        1e6,
+        "bytes",
+    ),  # largest length of a line [bytes], enough for about 50,000 columns
     "DEPTH": (100.0, "groups"),
 }
-# Unpacked size from which the ratio is checked: constant columns shrink by a factor of 1000, and less is unpacked fast.
+# Smallest unpacked size for which the ratio is checked [bytes]; constant columns reach a ratio of 1000.
 _ALLOWED: Final = 1 << 24
 _TRIES: Final = 5  # number of attempts to read a file that keeps changing
-_TICK: Final = (
-    50_000_000  # resolution of most file times [ns]; later changes are visible
-)
+_TICK: Final = 50_000_000  # resolution of most file times [ns]
 # resolution of file times on file systems that store whole seconds [ns]
 _COARSE: Final = 2_000_000_000
-# time to write a byte [ns]; it matters because the file time is set when the last write begins
+# Longest time to write a byte [ns]. A system may set the file time when the last write begins.
 _SLOWEST: Final = 5
-# pause for a write in progress, during which the file is incomplete [s]
+# Pause before a file is read again because a write may be in progress [s].
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
@@ -113,7 +114,7 @@ def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 
 class FileState(NamedTuple):
-    """Identity, size and times of a file; ``settled`` if no write is in progress and later writes are visible."""
+    """Identity, size and times of a file; ``settled`` if no write is pending and any later write would change them."""
 
     device: int
     inode: int
@@ -134,7 +135,7 @@ class FileState(NamedTuple):
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
         now = time.time_ns()
-        # The modification time can be set to any value; a time in the future is ignored.
+        # A modification time in the future is ignored, because programs can set it to any value.
         latest = max(
             status.st_ctime_ns, status.st_mtime_ns if status.st_mtime_ns <= now else 0
         )
@@ -162,12 +163,12 @@ class FileState(NamedTuple):
 
 
 def compute_slowness(changed: int, size: int) -> int:
-    """Return how much longer than usual a write may take, or a change may stay invisible in the times [ns]."""
+    """Return the extra time [ns] before a state counts as settled: large files and coarse file times need longer."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
 def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
-    """Return the state of a file after pending writes; None if the file keeps changing.
+    """Return the state of a file after all pending writes; return None if the file keeps changing.
 
     If the file ``may_grow``, the bytes up to the size of this state do not change: further bytes are appended.
     """
@@ -216,7 +217,7 @@ def _settle(name: str, state: FileState) -> FileState:
 
 def _state_of(name: str) -> FileState:
     """Return the present state of a file that may grow."""
-    return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
+    return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  os.stat is faster for many files
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
@@ -232,7 +233,7 @@ def read_into(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room`` and return their number, in one call if the system provides one."""
+    """Read bytes from an offset into ``room`` and return their number; one system call is used if possible."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)
@@ -276,7 +277,8 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
         path = path.resolve()
     except RuntimeError:  # Python before 3.13 raises this for links that form a loop
         path = path.absolute()
-    if path.is_symlink():  # a link that is left is part of a loop of links
+    # A name that is still a link after resolve() is part of a loop of links.
+    if path.is_symlink():
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
     # The temporary name is not derived from the file name, which may already have the largest allowed length.
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
@@ -304,7 +306,7 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
     if hasattr(os, "chown"):
         with suppress(PermissionError):
             os.chown(scratch, status.st_uid, status.st_gid)
-    # after the owner, since changing the owner clears the set-user-id bits
+    # The mode is set after the owner, because changing the owner clears the set-user-id bits.
     scratch.chmod(stat.S_IMODE(status.st_mode))
 
 
@@ -339,11 +341,11 @@ def add_checksum(text: str) -> str:
 
 
 def parse_record(line: bytes) -> dict[str, Any] | None:
-    """Return the record of a signed line; None if the line is damaged."""
+    """Return the record in a line with a checksum; None if the line is damaged."""
     body, _, checksum = line.rpartition(_CHECKSUM.encode())
     if checksum != f'{_compute_checksum(body)}"}}'.encode():
         return None
-    import json  # imported here to start faster
+    import json  # Imported here to keep start-up fast.
 
     record: dict[str, Any] = json.loads(line)
     return record

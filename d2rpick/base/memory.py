@@ -1,4 +1,4 @@
-"""Remember results for a record: a function computes each of them once, and every td that needs it shares it."""
+"""Remember results for a record: each result is computed once, and every td that needs it uses the same result."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     class Remembering(Protocol):
-        """A record that keeps the results computed for it."""
+        """A record of a run that keeps the results computed from it."""
 
         @property
         def memory(self) -> Memory:
-            """Results that were computed for this record."""
+            """Results that were computed from this record."""
 
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")

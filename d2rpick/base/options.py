@@ -13,9 +13,9 @@ from typing import Any, Final
 from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
-# Stands for the end of a range of whole numbers that has no upper limit.
+# Upper limit of a range of whole numbers that has no upper limit.
 UNLIMITED: Final = 2**63
-# Ranges of numbers: any number, above 0, from 0 up, from 0 to 1, from 1 up.
+# Ranges of numbers, each named after the numbers that it contains.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)
@@ -40,7 +40,7 @@ class Option(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if its value is a time of the run, or a window of time."""
+        """True if the value of the option is a time of the run, or a window of time."""
         return self.metavar in ("T", "LO HI")
 
 

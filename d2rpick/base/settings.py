@@ -21,7 +21,7 @@ _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _OF_REPOSITORIES: Final = (".git", ".hg")  # folders that mark the root of a repository
 # Settings of the deck check. They are searched for in the folder of each deck and the folders above.
 RULE_KEYS: Final = ("select", "ignore", "severity")
-# Characters that may surround the pieces of a dotted key.
+# Quotes and blanks that may surround the parts of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
 _MOST_KEYS_NAMED: Final = 8
 _LONGEST_VALUE: Final = 60  # largest number of characters of a quoted value
@@ -122,7 +122,7 @@ def format_toml_value(value: object) -> str:
 
 
 def locate_setting(path: str, key: str, table: str = "") -> str:
-    """Return a settings file and the line that sets ``key`` in ``table``, ``path:line``; the file alone if unknown.
+    """Return the place ``path:line`` where a settings file sets ``key`` in ``table``; the path if no line does.
 
     A ``table`` named "" is the top of the settings, in which a key may be the head of a table.
     """
@@ -148,10 +148,10 @@ def locate_setting(path: str, key: str, table: str = "") -> str:
 def refuse_unknown_settings(
     names: Iterable[str], known: Collection[str], source: str, table: str = ""
 ) -> None:
-    """Raise ConfigurationError, with its line and the most similar key, for the first key that is not ``known``."""
+    """Raise ConfigurationError for the first name that is not ``known``, with its line and the most similar key."""
     for name in names:
         if name not in known:
-            import difflib  # imported here to start faster
+            import difflib  # Imported here to keep start-up fast.
 
             near = difflib.get_close_matches(name, known, n=1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""

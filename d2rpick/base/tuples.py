@@ -10,7 +10,7 @@ from collections import namedtuple
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from typing import Any, ClassVar, NamedTuple as NamedTuple, dataclass_transform  # noqa: PLC0414
+    from typing import Any, ClassVar, NamedTuple as NamedTuple, dataclass_transform  # noqa: PLC0414  the name is exported
 
     @dataclass_transform(frozen_default=True, kw_only_default=True)
     class Record:

@@ -32,16 +32,16 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# A fork copies the locks of all threads; forking from one clean process avoids this and is nearly as fast.
+# A fork copies the locks of all threads. Forking from one clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of calls queued for each process: enough to keep it busy, and few enough to need little memory.
+# Number of calls queued for each process: enough to keep it busy, few enough to need little memory.
 _WAITING = 2
-# Smallest number of calls given to a cluster at a time, whose workers may come and go.
+# Smallest number of calls given to a cluster at a time, because its number of workers may change.
 _LEAST_ON_CLUSTER = 64
-# Attempts to start a pool: after the first one, the process from which workers are forked is restarted.
+# Largest number of attempts to start a pool; the fork server is restarted after the first attempt.
 _STARTS = 3
 _DYING = 0.1  # pause between attempts [s], so that the system can end a killed process
-# Errors that occur if a process is started after the process from which it is forked was killed.
+# Errors raised if a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 # Timeout for a scheduler's reply [s].
 _PATIENCE = 10
@@ -51,7 +51,7 @@ def count_cores() -> int:
     """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # some systems lack this function
+    except AttributeError:  # Some systems lack this function.
         return os.cpu_count() or 1
 
 
@@ -85,7 +85,7 @@ def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> F
     """Compute one call; an error becomes part of the answer."""
     try:
         return Finished(number, function(item), None)
-    except Exception as error:  # noqa: BLE001  handled by the caller, as for a pool
+    except Exception as error:  # noqa: BLE001  the caller handles any error
         return Finished(number, None, error)
 
 
@@ -95,7 +95,7 @@ class Cores(Farm):
     def __init__(self, processes: int, module: str) -> None:
         start_importing(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        # closing this end of the pipe ends the processes
+        # Closing this end of the pipe ends the processes.
         self._held, self._leash = Pipe(duplex=False)
         self._pool = self._new(processes)
 
@@ -145,7 +145,7 @@ class Cores(Farm):
         try:
             return _make_answer(number, future)
         finally:
-            # without this, an interrupt would wait for the call to finish
+            # Without wait=False, an interrupt would take effect only after the call.
             pool.shutdown(wait=False)
 
     def _begin_pool(
@@ -183,26 +183,25 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """End this process when the other end of ``held`` is closed; an interrupt ends it without a message."""
-    # this is the case in a spawned process; in a forked process `interruptible` has already changed the handler
+    # A spawned process still has this handler; in a forked process `interruptible` has already changed it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
-        held.poll(
-            None
-        )  # waits until the other end is closed, since nothing is ever sent
+        # poll() returns only when the other end is closed, because nothing is ever sent.
+        held.poll(None)
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
 
 
 def start_importing(processes: int, module: str) -> None:
-    """Let one process import ``module`` in the background; later ones are forked from it.
+    """Let one process import ``module`` in the background; workers are later forked from this process.
 
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
     if processes > 1:
-        # numpy reads this when it is imported: with several processes, threads would compete for the cores
+        # numpy reads this variable when it is imported; threads would compete with processes for the cores.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
             _start_server(module)
@@ -210,13 +209,11 @@ def start_importing(processes: int, module: str) -> None:
 
 def _start_server(module: str) -> None:
     """Start the process from which others are forked; an interrupt ends it without a message even while it imports."""
-    from multiprocessing import (
-        forkserver,
-        resource_tracker,
-    )  # Windows has no fork server
+    # Windows has no fork server.
+    from multiprocessing import forkserver, resource_tracker
 
     set_forkserver_preload(["d2rpick.base.interruptible", module])
-    resource_tracker.ensure_running()  # starting the server would unblock SIGINT
+    resource_tracker.ensure_running()  # The tracker is started first, because starting it unblocks SIGINT.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
@@ -225,7 +222,7 @@ def _start_server(module: str) -> None:
 
 
 def choose_farm(processes: int, module: str) -> Farm:
-    """Return the farm for a number of processes on this machine; for 1, this process does the work."""
+    """Return the object that computes calls in a number of processes; for 1, it computes them in this process."""
     return Cores(processes, module) if processes > 1 else Farm()
 
 
@@ -293,7 +290,7 @@ class Cluster(Farm):
 
 
 def _make_cluster_answer(number: int, status: str, result: Any) -> Finished:
-    """Return the answer of a cluster task. The ``result`` of a failed task is its error type, error and traceback.
+    """Make the answer of a cluster task; the ``result`` of a failed task is its error type, error and traceback.
 
     The status of a successful task may have changed meanwhile: its worker may have died after it returned the result.
     """

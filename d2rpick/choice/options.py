@@ -169,7 +169,7 @@ class ChoiceOptions:
     )
     # Rigid elements do not limit the time step, so that this cannot become smaller.
     step_ratio: float | None = make_option(
-        "Ratio of the time step while rigid to the one before, 1 or more.  [default: 1]",
+        "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,
         "N",
         metadata=_describe_use(of_sets=False, is_advanced=True),

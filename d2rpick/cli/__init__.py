@@ -1,4 +1,4 @@
-"""Provide the command line: a thin shell around the library, and the only place that prints or exits.
+"""Provide the command line: a thin layer around the library, and the only place that prints or exits.
 
 Commands are imported when they are called, and heavy modules inside the commands, so that ``--help`` stays fast.
 """
@@ -20,8 +20,8 @@ from d2rpick.base.errors import format_in_one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-# Module and one-line summary of each command, for the help, which does not import these modules.
-# Commands for one run come first, then those for many runs and decks, then those that compute runs.
+# Module and summary of each command, so that the help need not import the modules.
+# Commands for one run come first, then commands for many runs and decks, then commands that compute runs.
 _WORK: Final = {
     "info": ("one_run", "Show what is in the files of a run."),
     "drive": ("running", "Compute a Radioss run that switches itself."),
@@ -58,8 +58,8 @@ _VERSIONS: Final = (
 )
 
 
-class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe needs no more output
-    """Carries BrokenPipeError past click, which would exit with code 1. That code is reserved for objections."""
+class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output
+    """Carries BrokenPipeError past click, which would exit with code 1, the exit code of a failed check."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -71,8 +71,8 @@ def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 class Documented(click.Command):
     """A command whose help ends with examples."""
 
-    def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click's signature
-        """Return the help option of d2rpick. The option of click would be translated with files of the system."""
+    def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click passes the argument
+        """Return the help option. The option of click would be translated by files on the user's system."""
         return self._help
 
     @cached_property
@@ -90,9 +90,10 @@ class Documented(click.Command):
             help="Show this message and exit.",
         )
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """Write the examples, no wider than the help."""
-        from d2rpick.report.tables import wrap_command  # imported here to start faster
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002  click passes the argument
+        """Write the examples of a command, no wider than its help."""
+        # Imported here to keep start-up fast.
+        from d2rpick.report.tables import wrap_command
 
         lines = [
             wrap_command(f"  {line}", formatter.width)
@@ -104,12 +105,12 @@ class Documented(click.Command):
 class _CommandGroup(Documented, click.Group):
     """Loads commands on demand, and turns errors into messages and exit codes."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click passes the argument
         return list(COMMANDS)
 
     def format_commands(
         self,
-        ctx: click.Context,  # noqa: ARG002
+        ctx: click.Context,  # noqa: ARG002  click passes the argument
         formatter: click.HelpFormatter,
     ) -> None:
         for title, commands in (("Commands", _WORK), ("Experiments", _EXPERIMENTS)):
@@ -118,7 +119,7 @@ class _CommandGroup(Documented, click.Group):
                     [(name, line) for name, (_, line) in commands.items()]
                 )
 
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002  click passes the argument
         if name not in COMMANDS:
             return None
         command: click.Command = getattr(
@@ -144,9 +145,8 @@ class _CommandGroup(Documented, click.Group):
         if not args and not ctx.resilient_parsing:
             click.echo(ctx.get_help(), err=True)
             ctx.exit(COULD_NOT_RUN)
-        ctx.meta["d2rpick.command"] = tuple(
-            args
-        )  # a copy is kept, because click empties the list of arguments
+        # A copy is kept, because click empties the list of arguments.
+        ctx.meta["d2rpick.command"] = tuple(args)
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -156,7 +156,7 @@ class _CommandGroup(Documented, click.Group):
             raise _PipeClosed from error
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
-        except Exception as error:  # the user gets one line for any error
+        except Exception as error:  # The user gets one line for any error.
             if _is_interrupt(error):
                 raise click.Abort from None
             from d2rpick.cli.output import explain_error
@@ -165,7 +165,7 @@ class _CommandGroup(Documented, click.Group):
                 explain_error(error, ctx.meta.get("d2rpick.history", ()))
             ) from error
 
-    def main(  # type: ignore[override]
+    def main(  # type: ignore[override]  # options of click that are not needed are left out
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,
@@ -179,20 +179,20 @@ class _CommandGroup(Documented, click.Group):
             stop_with_error(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             stop_with_error(error.format_message())
-        except OSError as error:  # the help or the version cannot be written
+        except OSError as error:  # The help or the version could not be written.
             stop_with_error(format_in_one_line(error))
-        except click.Abort:  # click converts an interrupt to this
+        except click.Abort:  # click converts an interrupt to Abort.
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # keeps Python from reporting an error when it closes the stream at exit
+            # Writing to os.devnull keeps Python from reporting an error when it closes the stream at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return True if an interrupt caused the error. Python wraps an interrupt during the creation of a class."""
+    """Return True if an interrupt caused the error; an interrupt while a class is created becomes another error."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -228,13 +228,13 @@ def _print_versions(ctx: click.Context, _: click.Parameter, value: bool) -> None
 
 
 def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
-    """Make a command from a function; its docstring is the help text, with the examples at its end."""
+    """Make a command from a function; its docstring is the help text, with examples at the end."""
 
     def made(function: Any) -> _Made:
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        # each command of the examples on one line
+        # Each command of the examples is on one line.
         lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(

@@ -188,7 +188,7 @@ def _split_ids(texts: Sequence[str]) -> tuple[str, ...]:
 @options.make_command
 @click.argument("id", metavar="[ID]...", nargs=-1, type=choose_click_type("rules"))
 @options.add_options(*FILES)
-def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
+def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the usage line shows the name of the argument
     """Explain a rule of `d2rpick check` or a warning by its code; without ID, list all rules.
 
     Examples

@@ -83,7 +83,7 @@ def _write_item(name: str, text: str) -> tuple[str, ...]:
 
 
 def _write_text(text: str) -> str:
-    r"""Escape a line for roff: backslashes and hyphens appear as typed, and no line is mistaken for a request.
+    r"""Escape a line for roff, so that backslashes and hyphens appear as typed and no line is read as a request.
 
     Examples
     --------

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of a solver's table other than time_s, with their quantities.
+# Columns of the solver's tables, by the kind of table; each table also has the column time_s.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
@@ -128,7 +128,7 @@ def _run(box: Box, output: Output) -> None:
 
 
 def _scan(box: Box, output: Output) -> None:
-    """Compute many switched runs, among them that with the recommended tr."""
+    """Compute many switched runs, one of which has the recommended tr."""
     output = output.beside()
     scanning = Scanning(box)
     plot = output.plot

@@ -181,7 +181,7 @@ def suggest(
     else:
         output.answer(answer)
         decision = answer.decision
-    # A given td gets an answer even if it is poor; the answer and the card say so.
+    # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
 
@@ -494,7 +494,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the card's cautions that are not in the plan: about unverified windows and about the card itself."""
+    """Return the cautions of the card that the plan lacks: about unverified windows, and about the card itself."""
     if card is None:
         return []
     failed = tuple(
@@ -510,7 +510,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Before a file is opened, refuse to copy a deck that is not given, or to write a card without parts."""
+    """Before a file is opened, refuse to copy a deck that is not given, and to write a card without parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -522,7 +522,7 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy of the deck, and check it with the history.
+    """Write the copy of the deck, and check the copy by the history.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Make the options of the commands from the tables of requests; write settings and the command line to repeat."""
+"""Make the options of the commands from the tables of requests, and write the settings and the command line."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # a command function; click's decorators have no narrower type
+Decorated = Any  # type of a command function; click's decorators have no narrower type
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
-# means the positional argument, not the option with the same name
+# Stands for the positional argument, because an option has the same name.
 HISTORY: Final = "HISTORY"
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
@@ -48,7 +48,7 @@ DECK: Final = (
 DECK_OF_PARTS: Final = (
     f"{DECK}.  `--part recommended` is the set that d2rpick parts recommends."
 )
-# Sections of the help, after the options of a command that belong to no section.
+# Sections of the help; options that belong to no section come first.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
         *("tr", "td", "td_window", "steps", "min_rigid"),
@@ -64,10 +64,10 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": ADVANCED,
 }
-# Options that write files, which would already exist if the command is repeated.
+# Options that write files; if the command is repeated, these files already exist.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
-# Key in the context: True if only the settings are to be shown.
+# Key in the context of click: True if only the settings are to be shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -80,7 +80,7 @@ class Command(Documented):
     """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line. The settings file gives the options that neither it nor the environment sets."""
+        """Read the command line. Options that neither it nor the environment sets come from the settings file."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         ctx.meta[_SETTINGS_ONLY] = _ASKS_FOR_SETTINGS in args
@@ -100,7 +100,7 @@ class Command(Documented):
         return remaining
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the parameters; none of them is required if only the settings are to be shown."""
+        """Return the parameters; no parameter is required if only the settings are to be shown."""
         parameters = super().get_params(ctx)
         if ctx.meta.get(_SETTINGS_ONLY):
             return [_make_optional(parameter) for parameter in parameters]
@@ -109,7 +109,7 @@ class Command(Documented):
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the options in groups by their subject."""
+        """Write the help of the options in groups by their subject."""
         shown_options = (
             parameter
             for parameter in self.get_params(ctx)
@@ -136,14 +136,14 @@ class Command(Documented):
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(encode_text("\n".join(_list_settings(ctx))))
         if (words := list_words(ctx)) and not ctx.params.get("quiet"):
-            import shlex  # imported here to start faster
+            import shlex  # Imported here to keep start-up fast.
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
-        # Import numpy before the modules of a run, because its import makes many nested calls.
-        # Python 3.11 keeps its stack in pieces. A call that crosses the end of a piece makes it map and unmap memory.
+        # numpy is imported before the modules of a run, because its import makes many nested calls.
+        # In Python 3.11, nested calls are slow if they repeatedly cross the end of a piece of the stack.
         if ctx.params.get("history"):
-            import numpy as np  # noqa: F401
+            import numpy as np  # noqa: F401  only the import matters
         try:
             return super().invoke(ctx)
         except ArgumentError as error:
@@ -151,14 +151,14 @@ class Command(Documented):
 
 
 def _make_optional(parameter: click.Parameter) -> click.Parameter:
-    """Return a copy of a parameter that is not required."""
+    """Return a copy of a parameter that need not be given."""
     optional = copy(parameter)
     optional.required = False
     return optional
 
 
 class Either(click.Option):
-    """An option that excludes others. If one of them is on the command line, its environment variable is ignored."""
+    """An option that excludes others. If one of these is on the command line, its environment variable is ignored."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -186,7 +186,7 @@ def make_command(function: Decorated) -> click.Command:
 def add_options(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command the options of the tables. It gets one object per table, named like its class in lower case.
+    """Give a command the options of tables. The command gets one object per table, with the table's name in lower case.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def add_options(
 def _share_option(
     decorate: Callable[[Decorated], Decorated],
 ) -> Callable[[Decorated], Decorated]:
-    """Return a decorator that gives all commands the same option object, since only one of them is ever called."""
+    """Return a decorator that gives all commands the same option object, because only one command is ever called."""
     shared_option = decorate(lambda: None).__click_params__[0]
     again: Any = lambda *_, **__: shared_option  # noqa: E731  click accepts a function in place of the option class
     return click.option(cls=again)
@@ -296,7 +296,7 @@ def _make_decorator(
 def make_click_option(
     name: str, entry: Option, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make click's option from an entry of a table."""
+    """Make an option of click from an entry of a table."""
     about: dict[str, Any] = {
         "help": replace_arguments(entry.help),
         "metavar": entry.metavar,
@@ -340,7 +340,7 @@ def make_time_option(
 def make_file_option(
     name: str, text: str, metavar: str = "FILE", **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file, or ``many`` files, by repeating the option.
+    """Make an option of one command that names a file, or ``many`` files if the option is repeated.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
@@ -365,7 +365,8 @@ def open_judging_run(request: Request) -> Run | None:
     """Open the history with which cards are judged; return None if none is given."""
     if not request.history:
         return None
-    from d2rpick.api.asked import open_requested_run  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.api.asked import open_requested_run
 
     return open_requested_run(request)
 
@@ -374,7 +375,7 @@ def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -
     ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
-# Options that every command accepts but none uses itself; they are kept in the context.
+# Options that every command accepts but no command uses itself; they are kept in the context of click.
 _FLAGS: Final = [
     _share_option(
         click.option(
@@ -432,7 +433,7 @@ def insert_options(command: Sequence[str], words: Sequence[str]) -> tuple[str, .
 
 
 def _list_settings(ctx: click.Context) -> Iterator[str]:
-    """Yield a line for every option with its value and the source of the value."""
+    """Yield a line for every option with its value and the source of this value."""
     from d2rpick.report.tables import as_json
 
     for parameter in ctx.command.get_params(ctx):

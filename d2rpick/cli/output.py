@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# smallest width of a terminal that is used [columns]
+# Smallest width of a terminal for which a result is wrapped [columns].
 _NARROWEST: Final = 40
-# formats that the suffixes of file names imply
+# Output formats by the suffix of the file name.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
-# file types that users may expect for a report, but that are not supported
+# Suffixes of files that users may expect for a report, but that are not supported.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
-# Lines of a result in bold: recommendations, verdicts, and changes of a deck.
+# Pattern of the lines of a result that are bold: recommendations, verdicts, and findings of rules.
 _VERDICTS: Final = "use|use with care|do not use|no pair to use|common tr"
 _ANSWER: Final = rf"(?m)^(\* |(  )?({_VERDICTS})\b|  .*:\d+:\d+: (error|warning) D2R).*"
-# Code of the warning about a truncated file, and the words of the readers' notes that say the same.
+# Code of the warning about a truncated file.
 _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Options that have other names than the arguments that messages name in backticks.
+# Options whose names differ from the arguments that messages name in backticks.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -73,10 +73,8 @@ _OTHERS: Final = {
     "run": "history",
 }
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
-IN_WORDS: Final = {
-    "table",
-    "markdown",
-}  # output forms that already explain why nothing is recommended
+# Output forms that already explain why nothing is recommended.
+IN_WORDS: Final = {"table", "markdown"}
 
 
 class VerdictOnPair(Protocol):
@@ -96,7 +94,7 @@ class VerdictOnPair(Protocol):
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Writes results to stdout or a file, and everything else to stderr; ``inputs`` are never overwritten."""
+    """Writes results to stdout or a file, and messages to stderr; the files in ``inputs`` are never overwritten."""
 
     plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -140,7 +138,7 @@ class Output:
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Return an output that protects these inputs; raise D2RPickError if a file must not be written."""
+        """Return an output that protects these inputs; raise D2RPickError if it would overwrite a file."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -180,7 +178,7 @@ class Output:
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
-        """Return what an output form shows in addition to the answer."""
+        """Return what a form of output shows in addition to the answer."""
         from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
@@ -210,14 +208,14 @@ class Output:
             self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
-        """Exit with code 1 if the answer is an objection, unless ``--exit-zero`` is given."""
+        """Exit with code 1 if the answer reports a failure, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(
         self, decision: VerdictOnPair | None, min_quality: str
     ) -> None:
-        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``; a message names the limit."""
+        """Exit with code 1 if there is no pair, or its grade is below ``min_quality``; a message names this limit."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -229,7 +227,7 @@ class Output:
         self.finish(objection=True)
 
     def spare(self, inputs: Iterable[str]) -> None:
-        """Raise D2RPickError if a file would replace one of the inputs that are known only after reading."""
+        """Raise D2RPickError if an output file would replace an input that is known only after reading."""
         further = replace(self, inputs=tuple(inputs))
         for name in (self.file, self.plot, self.report):
             if name is not None:
@@ -237,7 +235,7 @@ class Output:
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError if ``name`` cannot be written, is an input, or exists and must not be replaced."""
-        from pathlib import Path  # imported here to start faster
+        from pathlib import Path  # Imported here to keep start-up fast.
 
         path = Path(name)
         if path.is_dir():
@@ -262,7 +260,7 @@ class Output:
             )
 
     def result(self, text: str) -> None:
-        """Write the result; on a terminal, the lines with the answer are bold."""
+        """Write the result; on a terminal, the most important lines are bold."""
         content = encode_text(text and f"{text}\n")
         if self.file is not None:
             self.write(self.file, content)
@@ -284,7 +282,7 @@ class Output:
             click.echo(content, nl=False)
 
     def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Write the card of an answer with its cautions; return False if there is none or a window fails."""
+        """Write the card of an answer with its cautions; return False if there is no card or a window fails."""
         if judged_card is None:
             self.content(b"")
             return False
@@ -293,7 +291,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print the notes of a reader on omissions, and the warnings."""
+        """Print what a reader omitted, and the warnings."""
         if self.quiet:
             return
         listed_cautions = list(cautions)
@@ -305,7 +303,7 @@ class Output:
             tell(f"warning: {caution.code}: {caution.message}")
 
     def finish_without_deck(self, deck: str) -> None:
-        """Exit with code 1, because a deck that was given belongs to another model and was not used."""
+        """Exit with code 1, because the user named a deck that belongs to another model and was not used."""
         if not self.exit_zero:
             tell(
                 f"d2rpick: exit code {OBJECTION}: {deck} is not the deck of this run, so the answer does not use it; "
@@ -344,9 +342,8 @@ def _find_implied_format(name: str) -> str | None:
         ctx.get_parameter_source("output_format")
         is not click.core.ParameterSource.DEFAULT
     )
-    if (
-        is_given or "write_as" in ctx.params
-    ):  # `extract` derives the format from the file name itself
+    # The command `extract` derives the format from the file name itself.
+    if is_given or "write_as" in ctx.params:
         return None
     form = next(
         (form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None
@@ -360,7 +357,7 @@ def _find_implied_format(name: str) -> str | None:
 
 
 def measure_columns(stream: TextIO) -> int | None:
-    """Return the width of a stream's terminal, limited to a readable width; None if it is not a terminal."""
+    """Return the width of a terminal, limited to a readable width; None if the stream is not a terminal."""
     columns_set = os.environ.get("COLUMNS", "")
     try:
         if columns_set.isdecimal():
@@ -375,20 +372,21 @@ def measure_columns(stream: TextIO) -> int | None:
 
 
 def tell(message: str) -> None:
-    """Print a message to stderr, with the options of the command line and without control codes.
+    """Print a message to stderr; it names options instead of arguments, and contains no control codes.
 
     The message is one line; on a terminal it is wrapped, but never in a log, where ``COLUMNS`` may be set as well.
     """
     text = make_printable(replace_arguments(message))
     if is_on_terminal() and (width := measure_columns(sys.stderr)):
-        from d2rpick.report.tables import wrap_lines  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.report.tables import wrap_lines
 
         text = wrap_lines(text, width)
     click.echo(text, err=True)
 
 
 def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
-    """Return any error as one line, which names options instead of arguments; ``--debug`` prints its traceback.
+    """Return any error as one line that names options instead of arguments; ``--debug`` prints its traceback.
 
     An unforeseen error names no input, so that ``inputs`` are added.
     """
@@ -402,7 +400,7 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
 
 def encode_text(text: str) -> bytes:
-    """Encode a string. File names may contain lone surrogates for undecodable bytes, which no encoding can write."""
+    """Encode a string. Characters that no encoding can write, as in some file names, are replaced."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
@@ -429,7 +427,7 @@ def find_option(argument: str) -> str:
 
 
 def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
-    """Replace argument names with options in a result for people, wrapped to ``width`` columns.
+    """Replace argument names with options in a result for people, and wrap it to ``width`` columns.
 
     Results for programs keep the argument names.
 
@@ -445,13 +443,13 @@ def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
     text = replace_arguments(text)
     if form != "table" or not width:
         return text
-    from d2rpick.report.tables import wrap_lines  # imported here to start faster
+    from d2rpick.report.tables import wrap_lines  # Imported here to keep start-up fast.
 
     return wrap_lines(text, width)
 
 
 def check_switched(purpose: str, request: Request, cards: Cards) -> None:
-    """Before a file is opened, refuse a card that switches no parts."""
+    """Refuse a card that switches no parts, before a file is opened."""
     if not (request.part or cards.node):
         problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
         way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"
@@ -468,7 +466,7 @@ def open_with_output(
     """
     from d2rpick.api.asked import open_requested_run
 
-    request.selection()  # refuses contradictory options before a file is opened
+    request.selection()  # The call refuses contradictory options before a file is opened.
     with show_reading(request.history, quiet=output.quiet):
         run = open_requested_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

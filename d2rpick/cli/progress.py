@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
-_PERIOD: Final = 1.0  # time before the first line, and between two lines [s]
+_PERIOD: Final = 1.0  # Time before the first progress line, and between two lines [s].
 
 
 @contextmanager
@@ -53,17 +53,17 @@ def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
 
 
 class Count:
-    """The number of finished runs out of ``total``; ``taken`` of them needed no computation."""
+    """The number of finished runs out of ``total``; ``taken`` of them came from an earlier study."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Set the number of finished runs; the first call sets the number that needed no computation."""
+        """Set the number of finished runs; the first call sets the number of runs from an earlier study."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
-        """Return the progress after ``seconds``, and the remaining time at this pace."""
+        """Describe the progress after ``seconds``, and the remaining time at this pace."""
         computed = self.done - max(self.taken, 0)
         if computed:
             remaining = f", {_format_duration(seconds / computed * (self.total - self.done))} left"
@@ -112,7 +112,7 @@ def show_progress(
     if quiet or not is_on_terminal():
         yield
         return
-    from threading import Event, Thread  # imported here to start faster
+    from threading import Event, Thread  # Imported here to keep start-up fast.
 
     done = Event()
     thread = Thread(target=_tell, args=(say, done, period), daemon=True)
@@ -130,9 +130,8 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
     line, seconds = "", 0.0
     while not done.wait(period):
         seconds += period
-        room = (
-            shutil.get_terminal_size().columns - 1
-        )  # a line that wraps could not be erased
+        # A line that wraps could not be erased.
+        room = shutil.get_terminal_size().columns - 1
         previous_line = line
         line = say(seconds)[-room:]
         sys.stderr.write(f"\r{line.ljust(len(previous_line))}")

@@ -1,4 +1,4 @@
-"""Define the commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
+"""Define the commands ``drive``, ``follow`` and ``first``, for runs in which parts are switched while they run."""
 
 from __future__ import annotations
 

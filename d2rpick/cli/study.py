@@ -193,7 +193,7 @@ def _read_list(name: str) -> Iterator[str]:
         raise FormatError(
             f"{name}: holds NUL bytes; give a text file with one run per line"
         )
-    # splitlines() is not used because names may contain other characters at which it splits.
+    # splitlines() is not used, because it also splits at characters that names may contain.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
@@ -208,7 +208,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
             raise D2RPickError(
                 f"{name}: --resume and --{option} are the same file; give two files"
             )
-    if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
+    if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116  pathlib would slow down start-up
         raise D2RPickError(
             f"{name}: --resume and standard output are the same file; send one elsewhere"
         )
@@ -249,8 +249,9 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to the CPU times of your runs, for --weights.
 
     Each RUN is the folder of one run, with its deck and the listings of its solver: NAME_0001.out with /MON/ON of
-    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  Costs that the runs
-    do not distinguish keep the measured ratio.  A run that is named twice is used once.
+    Radioss, d3hsp or glstat of LS-DYNA.  Give runs of the same model with and without switching.  If the runs
+    cannot distinguish the costs of two formulations, their built-in ratio is kept.  A run that is named twice is used
+    once.
 
     Examples
     --------

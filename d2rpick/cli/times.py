@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.request import Request
 
-# Commands that compute runs in SI units.
+# Commands that compute runs in SI units, so that their times are in seconds.
 _IN_SECONDS = ("rollover",)
-# Names of the arguments that contain the files of one run, or of many runs.
+# Name of the argument that contains the files of one run.
 _ONE_RUN = "history"
 _MANY_RUNS = "run"
-# Options that choose the time column and the format.
+# Options on which the time unit of a run depends.
 _COLUMNS = ("input_format", "time", "energy", "channel")
 
 
@@ -29,7 +29,7 @@ class TimeType(NumberType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Read a number; keep a time with a unit as it was typed."""
+        """Read a number, or keep a time with a unit as it was typed."""
         if isinstance(value, str) and value.strip()[-1:].isalpha():
             from d2rpick.api.times import is_time_with_unit
 

@@ -38,8 +38,8 @@ else:
     FloatType = click.ParamType  # this class is generic from click 8.4 on
 
 CARDS: Final = tuple(list_options(Cards))
-_PAIR: Final = 2  # number of values of an option that is a pair
-# Options that apply only together with another option. A settings file may set them for commands that lack it.
+_PAIR: Final = 2  # number of values of an option whose value is a pair
+# Options that apply only together with another option; settings may give them to commands without it.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -48,7 +48,7 @@ _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
 
 
 class NumberType(FloatType):
-    """A finite number with a decimal point, within its limits."""
+    """A finite number within its limits; the decimal sign is a point."""
 
     name = "number"
 
@@ -86,7 +86,7 @@ class File(click.types.StringParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Return a name; a NUL byte, which only a program can pass, is refused."""
+        """Return a name; refuse a NUL byte, which only a program can pass."""
         name = super().convert(value, param, ctx)
         if "\0" in name:
             self.fail(
@@ -98,11 +98,11 @@ class File(click.types.StringParamType):
 
     def shell_complete(
         self,
-        ctx: click.Context,  # noqa: ARG002
-        param: click.Parameter,  # noqa: ARG002
+        ctx: click.Context,  # noqa: ARG002  click passes the argument
+        param: click.Parameter,  # noqa: ARG002  click passes the argument
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Leave the completion to the shell."""
+        """Let the shell complete the name."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
@@ -117,19 +117,19 @@ class Program(click.types.StringParamType):
 
 
 class CompletedText(click.types.StringParamType):
-    """Text that the shell completes from a list of names."""
+    """A text that the shell completes from a list of names."""
 
-    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  subclasses use the argument
         """Return the names to choose from, each with a description."""
         return ()
 
     def shell_complete(
         self,
         ctx: click.Context,
-        param: click.Parameter,  # noqa: ARG002
+        param: click.Parameter,  # noqa: ARG002  click passes the argument
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the names with this prefix, except names that a shell would split."""
+        """Offer the names that begin with this prefix, except names that a shell would split."""
         import re
 
         from click.shell_completion import CompletionItem
@@ -168,7 +168,7 @@ class PartNames(Names):
 class RuleIds(CompletedText):
     """Ids of the rules of check."""
 
-    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
         """Return the rules with their summaries."""
         from d2rpick.report.findings import list_rules
 
@@ -178,7 +178,7 @@ class RuleIds(CompletedText):
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Offer the rules with this prefix, ignoring upper and lower case."""
+        """Offer the rules that begin with this prefix in upper or lower case."""
         return super().shell_complete(ctx, param, incomplete.upper())
 
 
@@ -186,7 +186,7 @@ class ChannelNames(Names):
     """Names of channels, completed from the history on the command line."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
-        """Return the channels in the files on the command line. Blanks become underscores, which mean the same."""
+        """Return the channels in the files on the command line; blanks become underscores, with the same meaning."""
         run = _open_typed_run(ctx)
         return [(name.replace(" ", "_"), "") for name in (run.channels if run else ())]
 
@@ -198,9 +198,8 @@ def _open_typed_run(ctx: click.Context) -> Run | None:
     from d2rpick.api.runs import read
     from d2rpick.base.errors import D2RPickError
 
-    words = ctx.meta.get("d2rpick.command", ())[
-        1:
-    ]  # click has not read any argument yet when an option is completed
+    # click has not read any argument yet when it completes an option.
+    words = ctx.meta.get("d2rpick.command", ())[1:]
     try:
         return read([word for word in words if Path(word).exists()])
     except (D2RPickError, OSError, ValueError):
@@ -221,10 +220,10 @@ class SolverName(CompletedText):
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Return the names for the help."""
+        """Return the names of the solvers for the help."""
         return f"[{'|'.join(list_solvers())}]"
 
-    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002
+    def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
         """Return the names of the solvers."""
         return [(name, "") for name in list_solvers()]
 
@@ -340,7 +339,7 @@ def _read_value(
         raise ConfigurationError(f"{position}: {error.message}") from None
     if not isinstance(option.type, File):
         return converted
-    from pathlib import Path  # imported here to start faster
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     folder = os.path.relpath(Path(position.partition(": ")[0]).parent)
     if has_list:
@@ -349,12 +348,10 @@ def _read_value(
 
 
 def _refuse_dangerous(option: click.Option, position: str) -> None:
-    """Refuse to start a program or write a file from settings, which another person may have written."""
+    """Refuse to start a program or write a file by settings, because another person may have written them."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
         reason = "programs, output files and overwrite are never taken from a file"
-    elif (
-        not option.expose_value
-    ):  # options that concern only one call, such as --help and --debug
+    elif not option.expose_value:  # Options that are not exposed concern only one call, such as --help and --debug.
         reason = "this is never taken from a file"
     else:
         return
@@ -393,7 +390,7 @@ def is_used(
     given_values: Mapping[str, Any],
     all_values: Mapping[Any, Any],
 ) -> bool:
-    """Return True if a setting applies, with the ``given`` options and all options in ``asked``."""
+    """Return True if a setting applies together with the ``given`` options and all options in ``asked``."""
     if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
-# Number of bytes searched to recognise a deck: titles and comments may precede the first keyword.
+# Number of bytes that are searched to recognise a deck; titles and comments may precede its first keyword.
 _HEAD = 64 * 1024
 
 
@@ -32,7 +32,7 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    # Imported here because these modules load numpy.
+    # Imported here because these modules import numpy.
     from d2rpick.deck import (
         ls_dyna_inventory,
         radioss_files,
@@ -55,7 +55,7 @@ def read_inventory(path: str) -> Inventory:
 
 
 def find_time_unit(path: str) -> str:
-    """Return the time unit that a Radioss run names for deck and computation; empty if it names none or two.
+    """Return the time unit that a Radioss run names for deck and computation; empty if it names none or two units.
 
     Decks of LS-DYNA name no units.
 
@@ -64,9 +64,8 @@ def find_time_unit(path: str) -> str:
     DeckError
         If the deck cannot be read.
     """
-    from d2rpick.deck.radioss_files import (
-        list_run_files,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.radioss_files import list_run_files
 
     if not list_run_files(path):
         return ""
@@ -104,7 +103,7 @@ def find_main_decks(folder: str) -> list[str]:
 
 
 def find_decks_of_run(folder: str) -> list[str]:
-    """Return the paths of the main decks in the folder of a run that have parts.
+    """Return the paths of the main decks with parts in the folder of a run.
 
     Restart decks and files that contain only switching cards have none. A Radioss run is represented by its starter
     deck.
@@ -116,14 +115,14 @@ def find_decks_of_run(folder: str) -> list[str]:
     return [
         path
         for path in decks
-        if os.path.samefile(os.path.dirname(path) or os.curdir, folder)  # noqa: PTH120, PTH121
+        if os.path.samefile(os.path.dirname(path) or os.curdir, folder)  # noqa: PTH120, PTH121  pathlib would slow down start-up
         and _has_parts(path)
     ]
 
 
 def _has_parts(path: str) -> bool:
-    """Return True if a deck has parts, or cannot be read."""
-    from d2rpick.deck import radioss_files  # imported here to start faster
+    """Return True if a deck has parts, or if it cannot be read."""
+    from d2rpick.deck import radioss_files  # Imported here to keep start-up fast.
 
     try:
         if radioss_files.list_run_files(path):
@@ -136,12 +135,13 @@ def _has_parts(path: str) -> bool:
 
         return bool(read_parts(read_deck(path)).materials)
     except DeckError:
-        return True  # the code that reads the deck reports the error
+        return True  # The code that reads the deck reports this error.
 
 
 def _list_includes(path: str) -> list[str]:
     """Return the names of the files that a deck includes; none if it cannot be read, which the check reports."""
-    from d2rpick.deck import radioss_files, reader  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck import radioss_files, reader
 
     try:
         if radioss_files.list_run_files(path):
@@ -155,7 +155,7 @@ def _list_includes(path: str) -> list[str]:
 
 def _list_files(folder: str) -> Iterator[str]:
     """Yield the paths of all visible files in a folder and its subfolders."""
-    from pathlib import Path  # imported here to start faster
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     for root, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
@@ -185,9 +185,9 @@ def _read_head(path: str) -> bytes:
     """
     from d2rpick.deck.source import SourceFile
 
-    with open(path, "rb", buffering=0) as file:  # noqa: PTH123  starts faster
+    with open(path, "rb", buffering=0) as file:  # noqa: PTH123  pathlib would slow down start-up
         head = file.read(_HEAD)
     try:
         return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
     except DeckError:
-        return head  # the check of the deck reports the error
+        return head  # The check of the deck reports this error.

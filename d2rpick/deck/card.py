@@ -36,12 +36,12 @@ if TYPE_CHECKING:
 
 
 STANDARD, LONG = 10, 20  # width of a field in standard and in long format [characters]
-# Text between commas; a comma inside an expression, as in <max(1,2)>, does not separate.  Compiled at first use.
+# Pattern of the text between commas. A comma inside an expression, as in <max(1,2)>, does not separate fields.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled at first use
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # This pattern is compiled at its first use, to keep start-up fast.
 _PARAMETERS: Final = [*PARAMETERS]
 _FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
@@ -51,7 +51,7 @@ class CardField(NamedTuple):
 
     text: str
     block: Block
-    distance: int  # number of lines below the keyword
+    distance: int  # number of lines from the keyword to the field
     column: int
 
     @property
@@ -76,7 +76,7 @@ Problem = tuple[CardField, str]
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """The value of a field; ``problem`` is empty, or the reason why ``value`` is only the default.
+    """The value of a field; ``problem`` says why ``value`` is only the default, and is empty otherwise.
 
     ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
@@ -125,7 +125,7 @@ class Row:
         return CardField(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
-        """Return the text of a field. The texts of all fields are cached, because callers read one after the other."""
+        """Return the text of a field. The texts of all fields are cached, because callers read them in order."""
         cells = self._cells
         if cells is None:
             cells = self._cells = [*map(str.strip, self._pieces())]
@@ -141,7 +141,7 @@ class Row:
 
 
 class Transform(NamedTuple):
-    """Effects of ``*INCLUDE_TRANSFORM`` on a file: the offsets of its ids and the factor of its times.
+    """Effects of ``*INCLUDE_TRANSFORM`` on an included file: the offsets of its ids and the factor of its times.
 
     ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
     """
@@ -170,7 +170,7 @@ class Transform(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Card:
-    """A keyword block that d2rpick uses; ``name`` is in upper case without ``*`` and format suffix."""
+    """A keyword block that d2rpick uses; ``name`` is the keyword in upper case without ``*`` and format suffix."""
 
     name: str
     block: Block
@@ -217,11 +217,11 @@ class Card:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Return the words of a Radioss keyword."""
+        """Return the words of a Radioss keyword, which are separated by slashes."""
         return tuple(self.name.split("/"))
 
     def options(self, keyword: str) -> frozenset[str]:
-        """Return the words of the card name after ``keyword``."""
+        """Return the words of the card name after ``keyword``, which are separated by underscores."""
         return frozenset(self.name.removeprefix(keyword).split("_")) - {""}
 
     @property
@@ -238,7 +238,7 @@ class Card:
         return self._number(row, column.position, default, int)
 
     def numbers(self, row: Row, line: DataLine) -> list[Any]:
-        """Read all columns of a line, which are numbers."""
+        """Read all columns of a line whose columns are all numbers."""
         return [
             self.real(row, column)
             if column.kind is float
@@ -249,7 +249,7 @@ class Card:
     def _number(
         self, row: Row, position: int, default: T, kind: Callable[[float], T]
     ) -> Value[T]:
-        """Read a field as a number of one type, with the parameters that it uses."""
+        """Read a field as a number of one type; parameters in the field are evaluated."""
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
@@ -264,7 +264,7 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; None for any other number, and in an include with other units."""
+        """Read a positive number; return None for any other number, and in an include file with other units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
@@ -282,7 +282,7 @@ class Card:
         )
 
 
-# Parameters.
+# The classes below represent the parameters of a deck.
 
 
 class Definition(NamedTuple):
@@ -304,7 +304,7 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """The parameters visible in one file: first local ones, then those of the including files, then global ones.
+    """The parameters visible in one file: local parameters hide those of including files and global ones.
 
     If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
     warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
@@ -318,7 +318,7 @@ class Scope:
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        # Number of definitions read before a card; later definitions do not apply to it.
+        # Number of definitions read before a card; later definitions do not apply to the card.
         self._known: float = math.inf
         self._seen = self
 
@@ -408,14 +408,14 @@ class Scope:
                 self._whole._count += 1
 
     def _tables(self) -> Iterator[_Table]:
-        """Yield the tables of definitions from the innermost scope to the global one."""
+        """Yield the tables of definitions, from the innermost scope to the global scope."""
         yield self._local
         yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
     def _definition(
         self, row: Row, name_field: str, text: str, replaceable: bool
     ) -> Definition | None:
-        """Evaluate one definition.
+        """Evaluate one definition of a parameter.
 
         ``name_field`` is the type letter with the name. Return None for another type letter.
         """
@@ -465,7 +465,7 @@ class Scope:
 def _read_definitions(
     rows: Sequence[Row], options: set[str]
 ) -> Iterator[tuple[Row, str, str]]:
-    """Yield the row, the name with its type letter, and the text of the value of each definition on the card."""
+    """Yield row, name with type letter, and text of the value of each definition on a parameter card."""
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return

@@ -32,15 +32,15 @@ class CardColumn(NamedTuple):
 
     @property
     def position(self) -> int:
-        """Return the number of fields of 10 characters before this column."""
+        """Return the number of fields of 10 characters that precede this column."""
         return self.start // WIDTH
 
     def cut(self, line: str) -> str:
-        """Return the text of this column, with its blanks."""
+        """Return the text of this column in a line, with its blanks."""
         return line[self.start : self.start + self.width]
 
     def format(self, value: Cell) -> str:
-        """Return a value, right-aligned in its column."""
+        """Return a value as text, right-aligned in this column."""
         return f"{value!s:>{self.width}}"
 
     def put(self, line: str, value: Cell) -> str:
@@ -107,7 +107,7 @@ class DataLine:
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
-        """Return a line with these values; a column without a value has 0, a blank or ``0.0``, by its type."""
+        """Return a line with these values. A column without a value gets 0, a blank or ``0.0``, by its type."""
         assert values.keys() <= self._columns.keys()
         defaults: dict[Kind, Cell] = {int: 0, float: 0.0, str: ""}
         return "".join(

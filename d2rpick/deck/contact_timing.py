@@ -1,4 +1,4 @@
-"""Find the times of force switches that give planned windows.
+"""Find the times of force switches that make parts rigid in planned windows.
 
 These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
 of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     Spans = tuple[Times, ...]
 
 
-_ROUNDING: Final = 1e-12  # relative rounding error of sums of times
+_ROUNDING: Final = 1e-12  # relative rounding error of a sum of times
 
 
 class Pushes(NamedTuple):
-    """Spans in which a contact force acts on the parts [time].
+    """Time spans in which a contact force acts on the switched parts [time].
 
     ``speed`` is that at which the parts approach the contact [length/time].
     """
@@ -37,7 +37,7 @@ class Pushes(NamedTuple):
 
 
 class ForceTiming(NamedTuple):
-    """Times of a force switch, and the windows that result.
+    """Times of a force switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
     Tdelay. ``offset`` is a distance, 0 for none.
@@ -51,7 +51,7 @@ class ForceTiming(NamedTuple):
 
 
 def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
-    """Return the times of a pair of LS-DYNA switch sets.
+    """Return the times of a pair of LS-DYNA switch sets that makes parts rigid in planned windows.
 
     It makes parts rigid when no force has acted for the wait (the force-free time that shows a flight), and deformable
     shortly before the next force. OFFSET is the distance that the parts fly from td of the first window to the contact
@@ -125,7 +125,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Return the shortest waiting time with the planned number of windows, of which none begins too early."""
+    """Return the shortest waiting time that gives the planned number of windows, none of which begins too early."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
@@ -146,12 +146,12 @@ def _find_least_wait(
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Return the first span that begins at or after a time; infinite times if there is none."""
+    """Return the first span that begins at or after a time; without one, return infinite times."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Return the last span that ends at or before a time; times of minus infinity if there is none."""
+    """Return the last span that ends at or before a time; without one, return times of minus infinity."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

@@ -1,4 +1,4 @@
-"""Write Radioss engine files as lines: the end of the leg, the bodies that are on and off, and the time-step limit."""
+"""Write Radioss engine files: the end of the engine run, the bodies to switch, and the time-step limit."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Smallest number of time steps in a rigid window, because the release is up to one time step late.
-# Each window has its own limit, so that later windows do not change the run before them.
+# Smallest number of time steps in a rigid window, because parts are released up to one time step late.
+# Each window has its own time-step limit, so that later windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-# the names of time history files have two digits for the number of the engine run
+# Largest number of engine runs, because the names of time history files have two digits for it.
 MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end [time], and its largest time step while bodies are rigid, or None."""
+    """An engine run: its number, its end [time], and the time-step limit while bodies are rigid; else None."""
 
     number: int
     stop: float
@@ -60,7 +60,7 @@ def plan_legs(
 
 
 def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
-    """Yield the lines that deactivate rigid bodies, all in one block.
+    """Yield the lines of the block that deactivates rigid bodies.
 
     The OpenRadioss starter ignores a second such block that follows the first one directly.
     """
@@ -69,7 +69,7 @@ def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
 
 
 def write_numbers(ids: Sequence[int]) -> Iterator[str]:
-    """Yield lines that list numbers."""
+    """Yield the lines of a list of numbers."""
     yield from (
         " ".join(map(str, ids[i : i + _NODES_PER_LINE]))
         for i in range(0, len(ids), _NODES_PER_LINE)
@@ -79,7 +79,7 @@ def write_numbers(ids: Sequence[int]) -> Iterator[str]:
 def write_engine_lines(
     leg: EngineFile, name: str, ids: Sequence[int], other_nodes: Sequence[int]
 ) -> Iterator[str]:
-    """Yield the lines of an engine file: its run, and the main nodes that are rigid; ``other_nodes`` stay off."""
+    """Yield the lines of an engine file that activates these main nodes; ``other_nodes`` stay deactivated."""
     yield f"/RUN/{name}/{leg.number}"
     yield RUN.write(Tstop=leg.stop)
     if leg.cap is not None and ids:

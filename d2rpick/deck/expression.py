@@ -20,13 +20,13 @@ Number = int | float
 _NUMBER = re.compile(
     r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII
 )
-_TOKEN: Final = (  # compiled at first use
+_TOKEN: Final = (  # This pattern is compiled at its first use, to keep start-up fast.
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
-REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # compiled at first use
-# Largest depth of nested parentheses: no deck needs more, and the recursion must not exhaust Python's stack.
+REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # This pattern is compiled at its first use, to keep start-up fast.
+# Largest depth of nested parentheses, so that the recursion cannot exhaust Python's stack.
 _DEEPEST = 50
-LONGEST = 40  # largest number of characters of a number
+LONGEST = 40  # largest number of characters of a number in a deck
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -37,7 +37,7 @@ class ExpressionError(Exception):
     """Raised inside the deck reader for a string that is not a number; the message says why."""
 
 
-@lru_cache(4096)  # a quick answer, because most fields are blank or 0
+@lru_cache(4096)  # Most fields are blank or 0, so results are cached.
 def parse_number(text: str) -> Number:
     """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` without the exponent letter.
 
@@ -58,7 +58,7 @@ def parse_number(text: str) -> Number:
 
 
 def is_deck_number(text: str) -> bool:
-    """Return True if `number` can read the string."""
+    """Return True if `parse_number` can read the string."""
     try:
         parse_number(text)
     except ExpressionError:
@@ -68,7 +68,7 @@ def is_deck_number(text: str) -> bool:
 
 @lru_cache(4096)
 def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Return the result of `of_kind` for a string that is a plain number; None if it must be evaluated."""
+    """Return the number in a string that is a plain number of this type; None if the string must be evaluated."""
     return (
         None
         if "&" in text or text[0] == "<"
@@ -196,7 +196,7 @@ def _raise_to_power(x: Number, y: Number) -> Number:
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
 
-# Precedence of each operator, and its function.
+# Precedence of each operator, and the function that applies it.
 _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
     "+": (1, operator.add),
     "-": (1, operator.sub),
@@ -207,7 +207,7 @@ _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = 
 
 
 class _Parser:
-    """Parser by precedence climbing: a value, then all operators after it with at least a given precedence."""
+    """Parser by precedence climbing: it reads a value, then all operators of at least a given precedence."""
 
     def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
         self.text = text
@@ -240,7 +240,7 @@ class _Parser:
             0
         ] >= lowest_level:
             level, operate = operation
-            # operators of equal precedence apply from the left, powers from the right
+            # Operators of equal precedence apply from the left, powers from the right.
             if self.tokens.pop(0) == "**":
                 operand = self.nested(level)
             else:
@@ -295,13 +295,13 @@ class _Parser:
         return _check_range(function(*arguments))
 
     def expect(self, sign: str) -> None:
-        """Remove the next token, which must be ``sign``."""
+        """Remove the next token, which must be the character ``sign``."""
         if self.tokens[0] != sign:
             raise self.unexpected()
         self.tokens.pop(0)
 
     def unexpected(self) -> ExpressionError:
-        """Return the error for the next token."""
+        """Return the error for an unexpected next token."""
         token = repr(self.tokens[0]) if self.tokens[0] else "the end"
         return ExpressionError(
             f"{self.text!r} is not an expression (found {token}, expected an operator, a value or its end)"
@@ -309,7 +309,7 @@ class _Parser:
 
 
 def _split_tokens(text: str) -> Iterator[str]:
-    """Yield the tokens of an expression."""
+    """Split the text of an expression into tokens."""
     position = 0
     text = text.rstrip()
     token = re.compile(_TOKEN, re.ASCII | re.IGNORECASE)

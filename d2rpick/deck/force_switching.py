@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    Spans = Sequence[tuple[float, float]]  # start and end of each time span
+    Spans = Sequence[tuple[float, float]]  # start and end of each time span [time]
 
 
 class ForceSwitch(NamedTuple):
-    """A switch set that waits for a force (``with_force``), or for the absence of a force.
+    """A switch set that waits for a force (``with_force`` is True), or for the absence of a force.
 
     It acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
     turn.
@@ -81,7 +81,7 @@ def _follow_switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which the two sets act in turn, each with True if it makes the parts rigid."""
+    """Yield the times at which two paired sets switch alternately, each with True if it makes the parts rigid."""
     ready = 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
@@ -97,7 +97,7 @@ def _follow_switches(
 
 
 def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
-    """Return the first time from ``since`` on with a force (or without a force); infinity if it never comes."""
+    """Return the first time from ``since`` on with a force, or without a force; infinity if there is no such time."""
     for start, end in contacts:
         if since < end:
             if with_force:

@@ -14,7 +14,7 @@ BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "sp
 # Number of integration points in each layer of a shell, by formulation class.
 _IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
-# Radioss, Ishell of quadrilaterals (Altair's public help for /PROP/TYPE1).
+# Formulation of Radioss quadrilaterals by Ishell (source: Altair's public help for /PROP/TYPE1).
 _ISHELL: Final = {
     **{number: Formulation(f"BT (Ishell {number})", BT) for number in (1, 2, 3, 4)},
     12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
@@ -23,7 +23,7 @@ _ISH3N: Final = {
     **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
-# Solids form one class: the measured costs of Isolid 24, 17 and 1 do not differ.
+# Name of Radioss solids by Isolid. They form one class, because the measured costs of 24, 17 and 1 are equal.
 _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
@@ -32,7 +32,7 @@ _ISOLID: Final = {
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
-# LS-DYNA, ELFORM of *SECTION_SHELL.  BT: one point; QEPH: one point, physically stabilised; QBAT: four points.
+# Formulation name and class of LS-DYNA shells by ELFORM; the class follows from the integration points.
 _ELFORM_SHELL: Final = {
     1: ("Hughes-Liu", BT), 2: ("Belytschko-Tsay", BT), 3: ("BCIZ triangle", BT), 4: ("C0 triangle", BT),
     5: ("membrane", BT), 6: ("S/R Hughes-Liu", QBAT), 7: ("S/R co-rotational Hughes-Liu", QBAT),
@@ -83,7 +83,7 @@ def _add_layer_points(shell: Formulation) -> Formulation:
 
 
 def _make_plain_formulation(kind: str, *, measured: bool) -> Formulation | None:
-    """Return the formulation of a kind of element that has no variants; None if it is unknown."""
+    """Return the formulation of a kind of element that has only one formulation; None if it is unknown."""
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
     cost = alike.get(kind)
     if kind in ("tetrahedron", "pentahedron", "thick shell"):

@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-_PIECE: Final = (
-    1 << 14
-)  # number of elements processed at once; their arrays fit into the processor's cache
+# number of elements processed at once, whose arrays fit into the processor's cache
+_PIECE: Final = 1 << 14
 # Nodes of each face of a brick, in the order seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
@@ -44,7 +43,7 @@ _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})
 
 
 class _ElementTotals(NamedTuple):
-    """Number, total size and smallest wave length of the elements of one kind in one part."""
+    """Number, total size and shortest wave path of the elements of one kind in one part."""
 
     kind: str
     number: int
@@ -139,7 +138,7 @@ def _compute_wave_speed(kind: str, material: Material | None) -> float | None:
 def compute_sizes_and_lengths(
     kind: str, nodes: Places, coordinates: Reals
 ) -> tuple[Reals, Reals]:
-    """Return the size of each element [length, area or volume] and the length that a wave crosses; NaN if unknown."""
+    """Return the size of each element, and the length that a wave crosses in a time step; NaN if unknown."""
     pieces = [
         _compute_sizes(kind, nodes[at : at + _PIECE], coordinates)
         for at in range(0, len(nodes), _PIECE)
@@ -150,7 +149,7 @@ def compute_sizes_and_lengths(
 
 
 def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the size of each element and the length that a wave crosses, both (n,); NaN if unknown."""
+    """Return the size of each element, and the length that a wave crosses, both (n,); NaN if unknown."""
     if kind in _LINES:
         length = np.linalg.norm(
             coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1
@@ -187,7 +186,7 @@ def _compute_areas(corners: Reals) -> Reals:
 
 
 def _compute_cross_products(a: Reals, b: Reals) -> Reals:
-    """Return the cross products of vectors (n, 3); several times faster than numpy.cross."""
+    """Return the cross products of vectors (n, 3), several times faster than numpy.cross."""
     next_axis = [1, 2, 0]
     second_axis = [2, 0, 1]
     return np.asarray(
@@ -209,7 +208,7 @@ def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals
 
 
 def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of solids, and the lengths that a wave crosses; wedges and tetrahedra repeat or omit nodes."""
+    """Return the volumes of solids, and the lengths that a wave crosses; nodes of a brick may repeat or be missing."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
         eight[:, column] = np.where(
@@ -242,7 +241,7 @@ def _compute_tetrahedron_volumes(
 
 
 class PartPosition(NamedTuple):
-    """Position of a part in the deck.
+    """Position, inertia and watched nodes of a part in the deck.
 
     ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
     [length^2]. ``watched`` maps the places of its nodes with written motion (in the node table) to their coordinates.
@@ -290,7 +289,7 @@ class Placement:
         }
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
-        """Return the mean position (3,) of the watched nodes of given parts [length], each node once.
+        """Return the mean position (3,) of the watched nodes of given parts [length]; each node is used once.
 
         None without any.
         """
@@ -331,7 +330,7 @@ class Placement:
 def _compute_shares(
     elements: Elements, coordinates: Reals
 ) -> Iterable[tuple[int, _PartShare]]:
-    """Return the contribution of the elements of one kind to each part."""
+    """Return what the elements of one kind contribute to the position of each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:
@@ -366,7 +365,7 @@ def _compute_shares(
 
 
 def _compute_centres(nodes: Places, coordinates: Reals) -> Reals:
-    """Return the mean of the nodes of each element (n, 3)."""
+    """Return the mean position of the nodes of each element, shape (n, 3)."""
     if (nodes != NO_NODE).all():
         return np.asarray(
             sum(coordinates[column] for column in nodes.T) / nodes.shape[1]
@@ -393,7 +392,7 @@ def _combine_shares(
         )
         / size
     )
-    # In ascending order, so that the few watched nodes can be looked up among the many nodes.
+    # The nodes are in ascending order, so that watched nodes can be found by bisection.
     nodes = inventory.nodes_by_part[part]
     positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     watched_nodes = inventory.watched[nodes[positions] == inventory.watched]

@@ -10,7 +10,7 @@ from typing import Final
 
 from d2rpick.deck.columns import DataLine, integers, reals, words
 
-# *DEFORMABLE_TO_RIGID_AUTOMATIC: two header lines, and a line for each part or part set.
+# Lines of *DEFORMABLE_TO_RIGID_AUTOMATIC: two header lines, and a line for each part or part set.
 SWITCH_TIMES: Final = DataLine(
     integers("SWSET CODE"), reals("TIME1 TIME2 TIME3"), integers("ENTNO RELSW PAIRED")
 )
@@ -20,32 +20,32 @@ SWITCH_COUNTS: Final = DataLine(
 TO_RIGID: Final = DataLine(integers("PID LRB"), words("PTYPE"))
 TO_DEFORMABLE: Final = DataLine(integers("PID"), words("PTYPE"))
 
-# *DEFORMABLE_TO_RIGID_INERTIA and *RIGID_DEFORMABLE_CONTROL
+# Lines of *DEFORMABLE_TO_RIGID_INERTIA and *RIGID_DEFORMABLE_CONTROL.
 INERTIA_PART: Final = DataLine(integers("PID"))
 INERTIA_CENTRE: Final = DataLine(reals("XC YC ZC TM"))
 INERTIA_TENSOR: Final = DataLine(reals("IXX IXY IXZ IYY IYZ IZZ"))
 RESTART_CONTROL: Final = DataLine(reals("NRBF NCSF RWF DTMAX"))
 
-# *PART: the line below the title, and the first line of its option INERTIA
+# Lines of *PART: the line below the title, and the first line of its option INERTIA.
 PART: Final = DataLine(integers("PID SECID"), words("MID"))
 PART_INERTIA: Final = DataLine(reals("XC YC ZC TM"), integers("IRCS"))
 
-# *SECTION: the first line; the first number of the second line is an area, a thickness or a damping constant.
+# Lines of *SECTION. The second line begins with an area, a thickness or a damping constant.
 SECTION: Final = DataLine(integers("SECID ELFORM"), reals("SHRF"), integers("NIP"))
 SECTION_SIZES: Final = DataLine(reals("FIRST"))
 
-# *MAT: the first line of an elastic material, and the second line of *MAT_RIGID
+# Lines of *MAT: the first line of an elastic material, and the second line of *MAT_RIGID.
 MATERIAL: Final = DataLine(words("MID"), reals("RO E PR"))
 RIGID_MATERIAL: Final = DataLine(reals("CMO"), integers("CON1 CON2"))
 
-# Sets, and the line with the id of a keyword with the option ID
+# Lines of sets, and the line that contains the id of a keyword with the option ID.
 SET: Final = DataLine(integers("SID"))
 SET_MEMBERS: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8"))
 SET_COLUMN: Final = DataLine(integers("ID1"))
 SET_PART_LIST: Final = DataLine(integers("PID1 PID2 PID3 PID4 PID5 PID6 PID7 PID8"))
 ENTITY: Final = DataLine(integers("ID"))
 
-# *CONSTRAINED keywords; NID is a node, or a node set with the option SET.
+# Lines of *CONSTRAINED keywords. NID is a node, or a node set if the keyword has the option SET.
 NODAL_BODY: Final = DataLine(integers("PID CID NSID"))
 EXTRA_NODES: Final = DataLine(integers("PID NID"))
 JOINT: Final = DataLine(integers("N1 N2 N3 N4 N5 N6"))
@@ -53,14 +53,14 @@ NODE_PAIR: Final = DataLine(integers("N1 N2"))
 GENERALIZED_WELD: Final = DataLine(integers("NSID"))
 GLOBAL_CONSTRAINT: Final = DataLine(integers("TC RC DIR"), reals("X Y Z"))
 
-# *BOUNDARY_SPC with its option BIRTH_DEATH, and *BOUNDARY_PRESCRIBED_MOTION
+# Lines of *BOUNDARY_SPC with its option BIRTH_DEATH, and of *BOUNDARY_PRESCRIBED_MOTION.
 SPC: Final = DataLine(integers("NID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ"))
 SPC_TIMES: Final = DataLine(reals("BIRTH DEATH"))
 MOTION: Final = DataLine(
     integers("TYPEID DOF VAD LCID"), reals("SF"), integers("VID"), reals("DEATH BIRTH")
 )
 
-# *LOAD_BODY, *LOAD_BODY_PARTS, and *DEFINE_CURVE with its points
+# Lines of *LOAD_BODY, *LOAD_BODY_PARTS, and *DEFINE_CURVE with its points.
 BODY_LOAD: Final = DataLine(
     integers("LCID"),
     reals("SF"),
@@ -74,7 +74,7 @@ CURVE_POINT: Final = DataLine(reals("A1 O1", 20))
 
 CONTACT: Final = DataLine(integers("SURFA SURFB SURFATYP SURFBTYP"))
 
-# *SENSOR_CONTROL (two lines), *SENSOR_SWITCH and *SENSOR_DEFINE_FORCE
+# Lines of *SENSOR_CONTROL (two lines), *SENSOR_SWITCH and *SENSOR_DEFINE_FORCE.
 SENSOR_CONTROL: Final = DataLine(
     integers("CNTLID"), words("TYPE"), integers("TYPEID TIMEOFF NREP")
 )
@@ -97,13 +97,13 @@ SENSOR_FORCE: Final = DataLine(
 TERMINATION: Final = DataLine(reals("ENDTIM"))
 DATABASE: Final = DataLine(reals("DT"), integers("BINARY LCUR"))
 
-# *INCLUDE_TRANSFORM: the four lines below the file name
+# The four lines of *INCLUDE_TRANSFORM below the file name.
 ID_OFFSETS: Final = DataLine(integers("IDNOFF IDEOFF IDPOFF IDMOFF IDSOFF"))
 OTHER_OFFSET: Final = DataLine(integers("IDROFF"))
 UNIT_FACTORS: Final = DataLine(reals("FCTMAS FCTTIM FCTLEN"))
 TRANSFORMATION: Final = DataLine(integers("TRANID"))
 
-# *PARAMETER: four pairs of name and value, and *PARAMETER_DUPLICATION
+# Lines of *PARAMETER (four pairs of name and value) and of *PARAMETER_DUPLICATION.
 PARAMETER_FLAG: Final = DataLine(integers("DFLAG"))
 PARAMETERS: Final = DataLine(
     words("NAME1 VALUE1 NAME2 VALUE2 NAME3 VALUE3 NAME4 VALUE4")

@@ -73,7 +73,7 @@ _OPTIONS: Final = {
     ),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# Keywords without elements: they change neither the mass nor the cost of a part.
+# Keywords without elements, which change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
 _TEN: Final = 10  # number of nodes in the second line of a solid element
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
@@ -86,7 +86,7 @@ _DAMPERS: Final = (
 )
 _AIRBAG: Final = ("MAT_FABRIC", "MAT_034")
 _VOID: Final = ("MAT_NULL", "MAT_009")
-# Materials that begin with density, Young's modulus and Poisson's ratio, by name and number.
+# Material keywords whose lines begin with density, Young's modulus and Poisson's ratio, by name and number.
 _ELASTIC: Final = {
     *(
         "ELASTIC",
@@ -211,7 +211,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
 def find_shared_nodes(
     cards: Sequence[Card], bodies: Mapping[int, int]
 ) -> dict[tuple[int, int], int]:
-    """Find a shared node for each pair of parts that belong to different bodies and share nodes.
+    """Find a shared node for each pair of parts that share nodes but belong to different bodies.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def find_shared_nodes(
 
 
 def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` that contains each node, by node id."""
+    """Return, by node id, the first of ``parts`` that contains the node."""
     part_by_node: dict[int, int] = {}
     for part, node in _list_nodes(cards, parts):
         part_by_node.setdefault(node, part)
@@ -245,7 +245,7 @@ def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int,
 def find_parts_of_nodes(
     cards: Sequence[Card], nodes: Collection[int]
 ) -> dict[int, set[int]]:
-    """Return the parts whose elements contain each of the given nodes, by node id."""
+    """Return, for each of the given nodes, the parts whose elements contain the node."""
     parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:
@@ -262,7 +262,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield the part id and node id for each node of the elements of given parts, in the order of the deck."""
+    """Yield part id and node id for each node of the elements of given parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
@@ -275,7 +275,7 @@ def _list_nodes(
 
 
 def _read_watched_nodes(deck: Deck) -> Integers:
-    """Return the node ids of *DATABASE_HISTORY_NODE: eight per line, or one with a title."""
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one with a title."""
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
@@ -320,9 +320,8 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
     """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        fitting = card.name.startswith(
-            "ELEMENT_SEATBELT_"
-        )  # seat-belt keywords without elements: slip ring, retractor, sensor and so on
+        # Seat-belt keywords without elements: slip ring, retractor, sensor and so on.
+        fitting = card.name.startswith("ELEMENT_SEATBELT_")
         if (
             card.name.startswith("ELEMENT_")
             and kind
@@ -339,7 +338,7 @@ def _is_readable(card: Card) -> bool:
 
 
 def _get_id_width(card: Card) -> int:
-    """Return the number of columns of an id."""
+    """Return the number of characters of an id column."""
     words = card.block.head.split()
     if card.width == LONG:
         return LONG
@@ -377,7 +376,7 @@ def _read_elements(
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
             )
-        # Rows with an element, a part and enough nodes are elements; other rows belong to options.
+        # A row with an element, a part and enough nodes is an element; other rows belong to options.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
@@ -388,7 +387,7 @@ def _read_elements(
 
 
 def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
-    """Join each line of element and part id with the line of nodes below it.
+    """Join each line that contains element id and part id with the line of nodes below it.
 
     Also return a last line that lacks its nodes.
     """
@@ -429,7 +428,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 
 
 def _read_codes(lines: Lines, fields: Layout) -> Integers:
-    """Return the last field of each line as integers. Most of them are 0 and need no parsing."""
+    """Return the last field of each line as integers. Most of these fields are 0 and need no parsing."""
     start, width = fields[-1]
     if (
         lines.in_columns
@@ -440,7 +439,7 @@ def _read_codes(lines: Lines, fields: Layout) -> Integers:
 
 
 def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData]:
-    """Return the data of all parts."""
+    """Return the data of all parts by part id."""
     kinds = mesh.kinds
     sections = read_sections(deck)
     materials = dict(_read_materials(deck, parts))

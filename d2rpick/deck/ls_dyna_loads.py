@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
 
-_PART_ID, _NODE_SET = 3, 4  # values of SSTYP and MSTYP
-# Prefixes of further keywords that connect parts; which parts they connect is not read.
+_PART_ID, _NODE_SET = 3, 4  # values of SSTYP and MSTYP that name a part or a node set
+# Beginnings of further keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = (
     *(
         "CONSTRAINED_TIED_NODES_FAILURE",
@@ -84,16 +84,17 @@ CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))
 _ALONG: Final = {f"LOAD_BODY_{letter}": axis for axis, letter in enumerate("XYZ")}
 _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
-_OWN_CENTRE: Final = (9, 10, 11)  # values of DOF that add a second line
-_RELATIVE: Final = 4  # value of VAD that adds a second line
-# Nodes within this fraction of the model size lie on the plane of a *CONSTRAINED_GLOBAL.
+# values of DOF that add a second line to a prescribed motion
+_OWN_CENTRE: Final = (9, 10, 11)
+_RELATIVE: Final = 4  # value of VAD that adds a second line to a prescribed motion
+# Largest distance of a node on the plane of a *CONSTRAINED_GLOBAL, as a fraction of the model size.
 _FLAT: Final = 1e-4
 
 
 def read_ls_dyna_boundary(
     deck: Deck, parts: DeckParts, nodes: tuple[Places, Reals, Places]
 ) -> Boundary:
-    """Return supports, prescribed motion and gravity.
+    """Return supports, prescribed motion and gravity of a deck.
 
     ``nodes`` holds ids, coordinates and codes of fixed translations.
     """
@@ -116,7 +117,7 @@ def read_ls_dyna_boundary(
 
 
 def _describe_card(card: Card) -> str:
-    """Return the keyword with its file and line."""
+    """Return the keyword of a card with its file and line, for messages."""
     return f"*{card.name} ({card.at})"
 
 
@@ -125,7 +126,7 @@ def _note_unknown_nodes(card: Card) -> str:
     return f"{_describe_card(card)}: the nodes that it constrains are not known"
 
 
-# Supports.
+# The functions below read supports.
 
 
 def _read_supports(deck: Deck) -> Iterator[Hold | str]:
@@ -165,7 +166,7 @@ def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold |
 
 
 def _set_times(hold: Hold, card: Card, row: Row, line: DataLine) -> Hold:
-    """Add the birth time and the death time of a card; missing values mean 0 and never."""
+    """Add the birth time and the death time of a card to its load; missing times mean 0 and infinity."""
     start, end = (
         card.real(row, line[name]).value * card.transform.time
         for name in ("BIRTH", "DEATH")
@@ -238,7 +239,7 @@ def _read_material_supports(deck: Deck, parts: DeckParts) -> Iterator[Hold]:
             )
 
 
-# Prescribed motion.
+# The functions below read prescribed motions.
 
 
 def _read_motions(deck: Deck) -> Iterator[Hold | str]:
@@ -283,7 +284,7 @@ def _read_motion(
     )
 
 
-# Gravity.
+# The functions below read gravity.
 
 
 def _read_gravity(deck: Deck, parts: DeckParts) -> Iterator[Gravity | str]:
@@ -312,7 +313,7 @@ def _read_gravity(deck: Deck, parts: DeckParts) -> Iterator[Gravity | str]:
 
 
 def _read_loaded_parts(card: Card, parts: DeckParts) -> frozenset[int] | None:
-    """Return the parts of a *LOAD_BODY_PARTS; None if they are unknown."""
+    """Return the parts on a *LOAD_BODY_PARTS card; None if they are unknown."""
     if card.lines:
         members = parts.members(
             card.integer(card.lines[0], LOADED_PARTS["PSID"]).value
@@ -326,7 +327,7 @@ def _read_loaded_parts(card: Card, parts: DeckParts) -> frozenset[int] | None:
 def _read_body_load(
     card: Card, row: Row, curves: Mapping[int, tuple[float, ...]]
 ) -> Gravity | None:
-    """Return the accelerations of a *LOAD_BODY.
+    """Return the accelerations on a *LOAD_BODY card.
 
     Empty if it acts in dynamic relaxation alone, None if they are unknown.
     """
@@ -337,7 +338,7 @@ def _read_body_load(
         return Gravity(None, ())
     scale = card.real(row, BODY_LOAD["SF"])
     ordinates = curves.get(curve.value + card.transform.rest, ())
-    # Negative, because the card accelerates the ground.
+    # The sign is negative, because the card accelerates the ground.
     values = find_plateaus(ordinates, -(scale.value or 1.0))
     if (
         card.transform.scaled
@@ -370,11 +371,11 @@ def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
             yield number.value + card.transform.rest, tuple(scaled.tolist())
 
 
-# Joints.
+# The functions below read joints.
 
 
 def read_joints(deck: Deck) -> Joints:
-    """Return the joints of parts in an LS-DYNA deck, except joints that let two rigid bodies rotate."""
+    """Return the joints between parts of an LS-DYNA deck, except joints that let two rigid bodies rotate."""
     joints = []
     unknown = [
         _describe_card(card) for name in _OTHER_TIES for card in deck.named(name)

@@ -43,16 +43,13 @@ _EXTRA_LINES: Final = {
     "FIELD": 1,
     "INERTIA": 3,
 }
-_FOLLOWED: Final = {
-    *_EXTRA_LINES,
-    "AVERAGED",
-    "TITLE",
-}  # AVERAGED and TITLE add no line
+# The options AVERAGED and TITLE add no line.
+_FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # value of IRCS with which *PART_INERTIA has an additional line
+_ROTATED = 1  # value of IRCS with which *PART_INERTIA has one more line
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
-# Node sets of each deck, cached.
+# Cached node sets of each deck.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
 # Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
@@ -77,7 +74,7 @@ _LINES: Final = {
     "TSHELL": 2,
 }
 _SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
-_ELEMENT_OPTIONS: Final = {  # options whose lines have no integers in the columns of ids
+_ELEMENT_OPTIONS: Final = {  # Options whose lines have no integers in the columns of the ids.
     *(
         "THICKNESS",
         "BETA",
@@ -103,14 +100,14 @@ _NO_CONTACTS: Final = {
     "GEBOD",
     "GUIDED",
 }
-# Contacts whose force can trigger a switch have one of these in their names.
+# Words in the names of contacts whose force can trigger a switch.
 _ABLE: Final = (
     "SURFACE_TO_SURFACE",
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
 _MOST_ROWS = (
-    # largest number of lines of a contact or wall without id; more lines may define a second one
+    # Largest number of lines of a contact or wall without an id; more lines may define a second contact.
     8
 )
 
@@ -138,7 +135,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Material, title and section of each part; part sets by id (None for a kind of set that cannot be read).
+    """Material, title and section of each part, and part sets by id; None for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -154,7 +151,7 @@ class DeckParts:
     all_known: bool = True
 
     def is_rigid(self, part: int) -> bool:
-        """Return True if the part has *MAT_RIGID."""
+        """Return True if the material of the part is *MAT_RIGID."""
         return part in self.materials and self.materials[part] in self.rigid_materials
 
     def members(self, set_id: int) -> tuple[int, ...] | None:
@@ -216,7 +213,7 @@ def find_rigid_materials(deck: Deck) -> Iterator[Card]:
 
 
 def name_material(card: Card, row: Row, column: CardColumn) -> str:
-    """Return the id of a material with its offset as text, or its name if the deck uses names."""
+    """Return the id of a material with its offset as text, or the name of the material if the deck uses names."""
     value = card.integer(row, column)
     if value.problem:
         return value.field.text.upper()
@@ -224,14 +221,14 @@ def name_material(card: Card, row: Row, column: CardColumn) -> str:
 
 
 def _add_parts(card: Card, parts: DeckParts) -> None:
-    """Add the parts of a card."""
+    """Add the parts on a card."""
     options = card.options("PART")
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        # ATTACHMENT adds one line, like PRINT.
+        # The option ATTACHMENT adds one line, like PRINT.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
-    # A composite is one part with a material for each ply, none of which makes it rigid.
+    # A composite is one part with a material for each ply, none of which makes the part rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add_part(card, card.rows[:2], "", parts)
@@ -242,7 +239,8 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     rows = card.rows
     at = 0
     extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
-    while at + 1 < len(rows):  # title, ids, and the lines of the options
+    # The lines of a part are the title, the ids, and the lines of the options.
+    while at + 1 < len(rows):
         material = name_material(card, rows[at + 1], PART["MID"])
         _add_part(card, rows[at : at + 2], material, parts)
         at += 2
@@ -257,7 +255,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
 def _add_part(
     card: Card, lines: Sequence[Row], material: str, parts: DeckParts
 ) -> None:
-    """Add a part by its lines of title and ids."""
+    """Add a part, given by its title line and its line of ids."""
     title, row = lines
     part = card.integer(row, PART["PID"])
     section = card.integer(row, PART["SECID"])
@@ -271,7 +269,7 @@ def _add_part(
 
 
 def _add_set(card: Card, parts: DeckParts) -> None:
-    """Add a part set."""
+    """Add the part set on a card."""
     options = card.options("SET_PART")
     rows = card.data
     if not rows:
@@ -316,7 +314,7 @@ def _read_set_members(
 
 
 def find_set_nodes(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
-    """Return the nodes of the node set with this number on a card; None if the deck lacks it or it cannot be read."""
+    """Return the nodes of the node set with this number on a card; None if the set is missing or cannot be read."""
     if deck not in _NODE_SETS:
         _NODE_SETS[deck] = {
             id_: ids
@@ -357,7 +355,7 @@ def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
 
 
 class SectionCard(NamedTuple):
-    """A *SECTION as written: its kind and ELFORM.
+    """A *SECTION as written: its kind and its ELFORM.
 
     ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
     """
@@ -447,7 +445,7 @@ def _read_nodal_rigid_bodies(
     """Yield the nodal rigid bodies of a card."""
     options = card.options(_BODY)
     rows = card.lines
-    # other options add lines, so the keyword defines only one body
+    # Other options add lines, so the keyword defines only one body.
     if options - {"TITLE"}:
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
@@ -491,7 +489,7 @@ def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
 
 
 def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Return constraints between two nodes: one per line, or one per card if an option adds lines."""
+    """Return the constraints between two nodes: one per line, or one per card if an option adds lines."""
     rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _get_first_line(card)
     return (_read_node_list(card, row, kind, NODE_PAIR) for row in rows)
 
@@ -509,7 +507,7 @@ def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Const
 
 
 def _get_first_line(card: Card) -> tuple[Row, ...]:
-    """Return the first line, or the next line if the option ``_ID`` adds a line for an id."""
+    """Return the first line of a card, or the next line if the option ``_ID`` adds a line for an id."""
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
@@ -524,7 +522,7 @@ def _read_node_list(
     return Constraint(kind, nodes[0].field, number, ids)
 
 
-# Keyword of each kind of constraint, and the function that reads a card of it.
+# Keyword of each kind of constraint, and the function that reads a card of this kind.
 _CONSTRAINTS: Final[
     Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
 ] = {
@@ -538,7 +536,7 @@ _CONSTRAINTS: Final[
 
 
 class Entity(NamedTuple):
-    """A contact or rigid wall: keyword, id and title as given (0 and empty for none), and its number in the deck."""
+    """A contact or rigid wall: keyword, id and title (0 and empty for none), and its number in the deck."""
 
     keyword: str
     id: int
@@ -552,13 +550,13 @@ class Entity(NamedTuple):
 
 
 class Entities(NamedTuple):
-    """The contacts or rigid walls of a deck; ``all_known`` is False if one keyword may define several."""
+    """The contacts or rigid walls of a deck; ``all_known`` is False if one keyword may define several of them."""
 
     found: tuple[Entity, ...]
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
+        """Return the contact or wall with this id, or else the one with this number in order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
-    # Function that returns the spans in which the force of a contact or wall exceeds a value; None if unknown.
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    # Function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
     Forces = Callable[[str, int, float], Spans | None]
 
 
@@ -39,7 +39,7 @@ _ALWAYS: Final = ((0.0, math.inf),)
 
 
 class Control(NamedTuple):
-    """A *SENSOR_CONTROL for a switch set, with the ids of its switches in the order in which they act.
+    """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order of their use.
 
     ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
     infinite.
@@ -127,7 +127,7 @@ def follow_control(
 
 
 def _find_first_time(spans: Spans, since: float) -> float:
-    """Return the first time from ``since`` on at which a condition is met; infinity if there is none."""
+    """Return the first time from ``since`` on at which a condition is met; infinity if there is no such time."""
     return next((max(since, start) for start, end in spans if since < end), math.inf)
 
 
@@ -186,7 +186,7 @@ def _find_spans_of_sensor(
     if card.transform.scaled:
         return f"{name}), which is in an include in other units"
     entity = card.integer(row, SENSOR_FORCE["TYPEID"]).value + card.transform.rest
-    # the magnitude of a force never falls below 0
+    # The magnitude of a force never falls below 0.
     if value < 0 or (value == 0 and not above):
         return _ALWAYS if above else ()
     strong = forces(kind, entity, value) if forces else None
@@ -198,7 +198,7 @@ def _find_spans_of_sensor(
 def _find_row(
     cards: Sequence[Card], column: CardColumn, number: int
 ) -> tuple[Card, Row] | None:
-    """Return the line that has this number in a column (with the id offset of its include), and its card."""
+    """Return the line that has this id in a column, with the id offset of its include file, and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )

@@ -1,4 +1,4 @@
-"""Read meshes: many lines in fixed columns at once as arrays, and the elements and nodes in them.
+"""Read meshes: arrays of numbers from many lines at once, and the elements and nodes that they define.
 
 A mesh of millions of lines is read in pieces. Lines with commas and fields with parameters are rare in a mesh and are
 read one by one. Columns of Radioss: Altair's public help for the elements, and the solver's published source.
@@ -25,22 +25,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card, Scope
     from d2rpick.deck.source import Block
 
-    Layout = Sequence[tuple[int, int]]  # first column and width of each field
+    # first column and width of each field [characters]
+    Layout = Sequence[tuple[int, int]]
     Integers = NDArray[np.int64]
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
 
-_WIDEST: Final = 240  # number of columns of the longest line of a mesh
+_WIDEST: Final = 240  # number of characters of the longest line of a mesh
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-# separator of the fields in lines without fixed columns
+# Characters that show that a line has no fixed columns, so that it is parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
-# Last column of most ids: a line with a character in this column is not blank.
+# Index of the last character of most ids; a line that is not blank there is not blank at all.
 _ID_ENDS: Final = 7
-_HIGHEST: Final = 10**17  # upper limit of ids; a longer number would overflow
+_HIGHEST: Final = 10**17  # upper limit of ids; larger numbers would overflow
 NO_NODE: Final = -1  # index of a missing node
-_DENSE: Final = 50_000_000  # largest id for which a table of all ids is small enough
-NOTHING: Final = -1  # stands for a field that is not an id
+_DENSE: Final = 50_000_000  # largest id for which a table of all ids fits into memory
+NOTHING: Final = -1  # placeholder for a field that contains no id
 # Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 
@@ -49,7 +50,7 @@ NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 class Lines:
-    """Data lines of a piece of a mesh, without comments and blank lines.
+    """The data lines in a piece of a mesh, without comments and blank lines.
 
     ``in_columns``: all lines have fixed columns.
     """
@@ -69,7 +70,7 @@ class Lines:
         return len(self.cells)
 
     def integers(self, fields: Layout) -> Integers:
-        """Return the ids in these fields, shape (lines, fields).
+        """Return the ids in these fields of all lines, shape (lines, fields).
 
         0 for a blank, `NOTHING` for text that is not an id.
         """
@@ -89,7 +90,7 @@ class Lines:
         return ids
 
     def reals(self, fields: Layout, wanted: slice) -> Reals:
-        """Return the numbers in the fields ``wanted``, shape (lines, wanted).
+        """Return the numbers in the fields ``wanted`` of all lines, shape (lines, wanted).
 
         0 for a blank, NaN for text that is not a number.
         """
@@ -103,7 +104,7 @@ class Lines:
         return numbers
 
     def _field(self, start: int, width: int) -> NDArray[np.uint8]:
-        """Return the characters of a field (lines, width), padded with blanks."""
+        """Return the characters of a field in all lines, shape (lines, width), padded with blanks."""
         cells = self.cells[:, start : start + width]
         missing = width - cells.shape[1]
         if missing:
@@ -112,7 +113,7 @@ class Lines:
 
     @cached_property
     def _texts(self) -> dict[int, str]:
-        """Return the lines without fixed columns, or with parameters, by their row."""
+        """Return the lines that have no fixed columns, or that contain parameters, by their row."""
         if self.in_columns:
             return {}
         special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(
@@ -124,7 +125,7 @@ class Lines:
         }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
-        """Return the texts of fields of a line."""
+        """Return the texts of some fields of a line."""
         if "," in text:
             cells = text.split(",")
             return [
@@ -195,12 +196,12 @@ def _parse_reals(field: NDArray[np.uint8]) -> Reals:
     texts = np.where(blank, b"0", texts)
     try:
         return texts.astype(np.float64)
-    except ValueError:  # solvers also read numbers like 1.5-3
+    except ValueError:  # Solvers also read numbers like 1.5-3.
         return np.array([parse_real(text.decode("latin-1")) for text in texts.tolist()])
 
 
 def _make_id(value: float) -> int:
-    """Return a value as an id, or `NOTHING`."""
+    """Return a value as an id, or `NOTHING` if it is no valid id."""
     return int(value) if value >= 0 and value == int(value) else NOTHING
 
 
@@ -229,7 +230,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 
 
 class NodeTable:
-    """Nodes of a mesh by index. Nodes with coordinates come first, then nodes that occur only in elements.
+    """The nodes of a mesh by index: first nodes with coordinates, then nodes that occur only in elements.
 
     ``ids`` are the node ids by place, shape (nodes,).
 
@@ -247,7 +248,7 @@ class NodeTable:
         self._sorted = self.ids[self._order]
 
     def places(self, ids: Places) -> Places:
-        """Return the index of each node; `NO_NODE` for a node that is not in the table."""
+        """Return the index of each node id; `NO_NODE` for a node that is not in the table."""
         if not self.ids.size:
             return np.full_like(ids, NO_NODE)
         if self._sorted[-1] <= _DENSE:
@@ -264,7 +265,7 @@ class NodeTable:
 
     @cached_property
     def _lookup(self) -> Places:
-        """Return a table of the indices by id, if all ids are small; it is faster than a search."""
+        """Return a table of the indices by id if all ids are small, because a table is faster than a search."""
         lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
         lookup[self._sorted[::-1]] = self._order[::-1]
         return lookup
@@ -345,7 +346,7 @@ class Mesh(NamedTuple):
 
 
 class _RadiossElementKind(NamedTuple):
-    """Kind of element: its name, the nodes that define its size, and the number of ids on each of its lines."""
+    """Kind of Radioss element: its name, the nodes that define its size, and the number of ids on each of its lines."""
 
     name: str
     nodes: int
@@ -372,7 +373,7 @@ KINDS: Final = {
 def read_elements(
     card: Card, *, damaged: bool = False
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield the kind, part ids and node ids of the elements of a card; a missing node has the id 0.
+    """Yield kind, part ids and node ids of the elements on a card; a missing node has the id 0.
 
     With ``damaged`` also yield elements whose ids are incomplete.
     """
@@ -404,7 +405,7 @@ def find_parts_with_elements(starter: Starter) -> set[int]:
 def find_parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Return, for each group of nodes and parts, the parts with all their nodes in the group."""
+    """Return, for each group of nodes and parts, the parts whose nodes all belong to the group."""
     elements = [*_read_element_blocks(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():
@@ -421,7 +422,7 @@ def find_parts_within(
 
 
 def _read_element_blocks(starter: Starter) -> Iterator[tuple[int, Integers]]:
-    """Yield part ids and node ids of elements, block by block. The node is 0 if the lines cannot be read."""
+    """Yield part ids and node ids of elements, block by block. If the lines cannot be read, the node id is 0."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-# assumed number of integration points through the thickness; most shells have 2 to 5
+# assumed number of integration points through the thickness, because most shells have 2 to 5
 _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Kinds of elements that stay deformable when their part is switched to rigid.
@@ -37,7 +37,7 @@ DISCRETE: Final = frozenset({SPRING, "seatbelt"})
 
 
 class Hold(NamedTuple):
-    """A support or a prescribed motion: its name, and its nodes and parts, held from ``start`` to ``end`` [time].
+    """A support or a prescribed motion: its name, and the nodes and parts held from ``start`` to ``end`` [time].
 
     ``nodes`` are node ids, or places once it is `placed`. ``parts`` are held as a whole. ``axes`` are the fixed global
     directions of translation; empty if only rotations are fixed. ``counts``: it holds the part whatever the axes are,
@@ -54,7 +54,7 @@ class Hold(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Gravity along a global ``axis`` (None for a local one), with the constant ``values`` of its curve.
+    """Gravity along a global ``axis`` (None for a local axis), with the constant ``values`` of its load curve.
 
     ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
     nodes.
@@ -67,7 +67,7 @@ class Gravity(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids or indices) and the parts in it."""
+    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids or indices) and its parts."""
 
     kind: str
     nodes: Places
@@ -99,7 +99,7 @@ class Boundary(NamedTuple):
     def of(
         cls, holds: Sequence[Hold | str], loads: Sequence[Gravity | str], *, whole: bool
     ) -> Boundary:
-        """Separate supports and gravity from notes (text); if the deck is not ``whole``, gravity is unknown."""
+        """Separate supports and gravity from notes (strings); unless the deck is ``whole``, gravity is unknown."""
         gravity = tuple(load for load in loads if isinstance(load, Gravity))
         is_known = whole and len(gravity) == len(loads)
         notes = tuple(note for note in (*holds, *loads) if isinstance(note, str))
@@ -125,8 +125,8 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Replace node ids by indices in the table; nodes that are not in the table are dropped."""
-    # The nodes of a joint are never None, which mypy does not see for this kind.
+    """Replace node ids with indices in the table; nodes that are not in the table are dropped."""
+    # The nodes of a joint are never None, which mypy cannot infer for this type.
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
         for load in acting
@@ -139,7 +139,7 @@ def make_ids(numbers: Iterable[int]) -> Places:
 
 
 def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
-    """Return the values at which a function is constant between two points, times ``scale``.
+    """Return the values at which a function is constant between two points, multiplied by ``scale``.
 
     Empty if it is never constant.
 
@@ -160,7 +160,7 @@ def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]
 
 
 class Formulation(NamedTuple):
-    """Formulation of the elements of a part: its name, and the class that defines their cost.
+    """Formulation of the elements of a part: its name, and the class that determines their cost.
 
     ``cost`` is a key of the weights, or None if it is unknown. ``measured``: the weight was measured for this
     formulation, not for a similar one. ``in_plane`` is the number of integration points in each layer of a shell.
@@ -173,7 +173,7 @@ class Formulation(NamedTuple):
 
 
 class Material(NamedTuple):
-    """A material.
+    """A material of a deck: its keyword, its kind, and its elastic constants.
 
     Its keyword, ``kind`` ("deformable", "rigid", "spring", "airbag" or "void"), and its elastic constants.
 
@@ -209,7 +209,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """Data of one part without its elements; ``unswitchable`` is the reason not to switch it, or empty."""
+    """Data of one part without its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
 
     id: int
     title: str
@@ -284,7 +284,7 @@ class Inventory:
         return formulation or Formulation(kind, None, measured=False)
 
     def further_points(self, part: int, kind: str) -> int:
-        """Return the number of integration points of a shell element in the layers after the first.
+        """Return the number of integration points of a shell element in all layers but the first.
 
         0 for other elements.
         """
@@ -297,7 +297,7 @@ class Inventory:
 
     @cached_property
     def nodes_by_part(self) -> Mapping[int, Places]:
-        """Return the node indices of every part, ascending."""
+        """Return the ascending node indices of every part."""
         pieces_by_part: dict[int, list[Places]] = {}
         for elements in self.elements:
             order = np.argsort(elements.part, kind="stable")
@@ -337,7 +337,7 @@ class Inventory:
 
     @cached_property
     def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return for each part the parts that joints connect to it, with the kinds of these joints."""
+        """Return, for each part, the parts that joints connect to it, with the kinds of these joints."""
         incomplete_bodies = (
             body
             for body, whole in zip(self.switched, self.ready, strict=True)
@@ -396,7 +396,7 @@ class Inventory:
         return tuple(whole_parts)
 
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Return the rigid bodies that these parts form: parts connected by nodes, joints or springs form one body.
+        """Return the rigid bodies that these parts form; parts connected by nodes, joints or springs form one body.
 
         A car with its engine on mounts is one body. Engine, battery and wheels alone are several, like loose wheels. If
         all parts of a rigid body of the deck (attribute `switched`) are among these parts, they form one body. Springs
@@ -427,8 +427,15 @@ class Inventory:
         mask = self._mask(body if springs else ())
         return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
+    @property
+    def springs(self) -> frozenset[int]:
+        """Parts that have only springs and the like."""
+        return frozenset(
+            part for part, kinds in self.counts.items() if {*kinds} <= DISCRETE
+        )
+
     def _discrete(self, part: int) -> bool:
-        """Return True if a part has only springs. Springs form no rigid body, but move with one."""
+        """Return True if a part consists of springs. Springs form no rigid body, but move with one."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
@@ -458,7 +465,7 @@ class Inventory:
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
         """Count, by part and kind, the elements whose nodes all belong to these parts."""
-        # the index NO_NODE refers to the last entry
+        # The index NO_NODE is -1 and selects this last entry.
         inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:
@@ -478,7 +485,7 @@ class Inventory:
 
 
 def _count_elements(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
-    """Add elements of a kind to the counts of their parts."""
+    """Add elements of one kind to the element counts of their parts."""
     for part, count in zip(
         *(values.tolist() for values in np.unique(parts, return_counts=True)),
         strict=True,

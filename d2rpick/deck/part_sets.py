@@ -11,10 +11,10 @@ from d2rpick.deck.ls_dyna_columns import SET, SET_PART_LIST
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-# ids of the part sets; the key is the parts in ascending order
+# Ids of the part sets by their parts in ascending order.
 PartSets = Mapping[tuple[int, ...], int]
 NO_SETS: Final[PartSets] = {}
-# largest number of parts that a card lists; more parts become a part set
+# Largest number of parts that a card lists; for more parts, the card names a part set.
 _MOST_LISTED: Final = 10
 
 
@@ -29,7 +29,7 @@ def number_sets(
 
 
 def name_parts(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
-    """Return the ids and kinds (PTYPE) that name the parts: the id of their part set, if there is one."""
+    """Return ids and kinds (PTYPE) by which a card names the parts: their part set, if there is one, or each part."""
     number = part_sets.get(tuple(sorted(parts)))
     return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
 

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Cached node labels of each deck: a mesh may have millions of nodes.
+# Cached piece numbers of the nodes of each deck, because a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
 
-# Kinds of elements whose nodes have no rotations.
+# Kinds of elements whose nodes have no rotational degrees of freedom.
 _UNTURNED: Final = {
     "solid",
     "tetrahedron",
@@ -43,9 +43,9 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Nodes lie in one plane if they deviate from it by less than this fraction of the size of their piece.
+# Largest distance of a node from its plane, as a fraction of the size of the piece.
 _FLAT: Final = 1e-6
-# A piece with less than this fraction of the mass of all pieces on springs hardly moves the other pieces.
+# Smallest mass of a piece that moves other pieces on springs, as a fraction of the mass of all these pieces.
 _HEAVY: Final = 0.05
 
 
@@ -64,7 +64,7 @@ def count_pieces(
 def label_pieces(
     inventory: Inventory, parts: frozenset[int], *, springs: bool = True
 ) -> Places:
-    """Return, for each node of the deck, the number of its piece (nodes,); cached.
+    """Return the number of the piece to which each node of the deck belongs, shape (nodes,); the result is cached.
 
     Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
     """
@@ -90,7 +90,7 @@ def _compute_labels(
         if row.size
     ]
     links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
-    # older versions of scipy accept only 32-bit indices
+    # Older versions of scipy accept only 32-bit indices.
     links = links[:, (links != NO_NODE).all(axis=0)].astype(np.int32)
     graph = coo_array(
         (np.ones(links.shape[1], bool), (links[0], links[1])), shape=(size, size)
@@ -101,7 +101,7 @@ def _compute_labels(
 def _list_connections(
     inventory: Inventory, parts: frozenset[int], *, springs: bool
 ) -> Iterator[Places]:
-    """Yield arrays with connected nodes in each row."""
+    """Yield arrays in which the nodes of each row are connected."""
     wanted = np.array([*parts], np.int64)
     part_nodes = inventory.nodes_by_part
     for elements in inventory.elements:
@@ -190,10 +190,9 @@ def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -
 
 
 def _find_rotating_nodes(inventory: Inventory) -> Mask:
-    """Return an array that is True for nodes with rotations."""
-    has_rotations = np.zeros(
-        len(inventory.coordinates) + 1, bool
-    )  # the index NO_NODE refers to the last entry
+    """Return an array that is True for nodes that have rotational degrees of freedom."""
+    # The index NO_NODE is -1 and selects this last entry.
+    has_rotations = np.zeros(len(inventory.coordinates) + 1, bool)
     for elements in inventory.elements:
         if elements.kind not in _UNTURNED:
             has_rotations[elements.nodes] = True
@@ -205,7 +204,7 @@ def _find_rotating_nodes(inventory: Inventory) -> Mask:
 def _find_symmetry_axes(
     inventory: Inventory, members: Places, fixed: Mask
 ) -> frozenset[int]:
-    """Return the axes along which a symmetry plane, or fixing of all nodes, holds a piece; ``fixed`` is (members, 3).
+    """Return the axes along which a symmetry plane, or fixing all nodes, holds a piece; ``fixed`` is (members, 3).
 
     The piece lies on one side of the plane, all its nodes on the plane are fixed, and gravity does not act along the
     axis.
@@ -238,13 +237,13 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
     return bool(one_side and (on_plane == fixed).all())
 
 
-# The longest period of pieces that oscillate on springs, from the masses and springs of a deck.
-# A piece (connected without springs) has mass m, and the pieces that its springs connect to it have mass M.
-# The reduced mass is mu = m M/(m + M).
-# A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K.
-# The period along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
+# The code below computes the longest period of pieces that oscillate on springs.
+# A piece has no springs inside and has mass m; its springs connect it to pieces of total mass M.
+# The reduced mass of such a piece is mu = m M/(m + M).
+# A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K of the piece.
+# The period of a piece along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
 # A load is transmitted first in the stiffest direction, so the period uses the largest lambda.
-# With the trace of K (the sum of all k) in place of lambda, the same formula gives a lower limit of all periods.
+# If the trace of K replaces lambda, the formula for the period gives a lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):
@@ -256,14 +255,14 @@ class InnerPeriod(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A piece connected without springs: its parts and its mass."""
+    """A piece of the mesh that is connected without springs: its parts and its mass."""
 
     parts: frozenset[int]
     mass: float
 
 
 class _Spring(NamedTuple):
-    """A spring: its stiffness matrix (3, 3), and the labels of the pieces that it connects."""
+    """A spring: its stiffness matrix (3, 3), and the numbers of the pieces that it connects."""
 
     stiffness: Reals
     joins: frozenset[int]
@@ -309,7 +308,7 @@ def find_inner_period(inventory: Inventory) -> InnerPeriod | None:
 def _weigh_pieces(
     inventory: Inventory, parts: Collection[int], labels: Places
 ) -> Mapping[int, _Piece] | None:
-    """Return the pieces by label; None if the mass of a part is unknown."""
+    """Return the pieces by their numbers; None if the mass of a part is unknown."""
     masses = compute_masses_and_steps(inventory)
     pieces_by_label = dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
@@ -344,7 +343,7 @@ def _weigh_pieces(
 def _find_springs(
     inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]
 ) -> Iterator[_Spring | None]:
-    """Yield the springs between two pieces; None for a spring with unknown stiffness."""
+    """Yield the springs between two pieces; None stands for a spring of unknown stiffness."""
     springs = (elements for elements in inventory.elements if elements.kind == SPRING)
     for elements in springs:
         for part, ends in zip(

@@ -18,7 +18,7 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # width of a field [characters]
-# largest number of characters of a number; a blank separates it from the next field
+# Largest number of characters of a number; a blank separates the number from the next field.
 LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
@@ -35,7 +35,7 @@ PHYSICS = (
 
 
 class Printing(NamedTuple):
-    """Options of a card besides its times; a solver uses the options listed in ``Solver.takes``.
+    """Options of a card besides its times; each solver uses the options that ``Solver.takes`` lists.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ def write_number(value: float, width: int = LONGEST) -> str:
         raise DeckError(
             f"{value:g} cannot be written in {width} columns; give a number that fits"
         )
-    # an exact text is preferred, then digits on both sides of the point, then a short text
+    # An exact text is preferred, then digits on both sides of the point, then a short text.
     return min(
         fitting,
         key=lambda text: (
@@ -197,7 +197,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
-    """Return the distinct ids; raise DeckError if there are none, or if one needs more than ``digits`` columns."""
+    """Return the distinct ids; raise DeckError if there are none, or if an id needs more than ``digits`` columns."""
     if not ids:
         raise DeckError(
             "no id of a part or body to switch was given, expected at least one"

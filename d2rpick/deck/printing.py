@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE that waits for the end of a force, and CODE that waits for a force
+# For each kind: the CODE that waits for the end of a force, and the CODE that waits for a force.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -86,14 +86,14 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-# solver for a history whose format does not identify the solver
+# Solver for a history whose format does not identify the solver.
 DEFAULT: Final = "ls-dyna"
 
 
 def _print_ls_dyna(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print two unpaired CODE 0 sets for each window, with times of at most 9 characters.
+    """Print two unpaired CODE 0 sets for each window; their times have at most 9 characters.
 
     Raises
     ------
@@ -157,9 +157,8 @@ def _print_ls_dyna_contact(
     DeckError
         As `_ls_dyna`, and if no TIME3 gives as many windows as planned.
     """
-    from d2rpick.deck.contact_timing import (
-        find_pair_timing,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.contact_timing import find_pair_timing
 
     windows = printed_card.refuse_overlapping_windows(windows)
     ids = check_ids(printing.part)
@@ -202,7 +201,7 @@ def _print_ls_dyna_contact(
 def _number_switch_sets(
     first: tuple[int, int], count: int
 ) -> Iterator[tuple[int, int]]:
-    """Yield the ids of the two switch sets of each window, all different."""
+    """Yield the ids of the two switch sets of each window; all ids are different."""
     if first[0] == first[1]:
         raise DeckError(f"both switch sets have id {first[0]}; give two different ids")
     above = max(first) + 1
@@ -251,7 +250,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
 def _print_radioss(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print the engine files: one leg up to each switch, and one to the end of the run.
+    """Print engine files: one engine run up to each switch, and one to the end of the run.
 
     The main nodes are those of /RBODY in the starter deck, for bodies without sensor. Without a given limit, the time
     step is at most 1/1000 of the rigid window while the bodies are rigid.
@@ -284,9 +283,8 @@ def _print_radioss_sensors(
     DeckError
         As `_radioss` does.
     """
-    from d2rpick.deck.radioss_sensors import (
-        invert_spans,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.radioss_sensors import invert_spans
 
     windows, _, _ = _check_run(windows, printing)
     return _print_sensors(
@@ -327,7 +325,7 @@ def _print_radioss_contact(
 
 
 def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
-    """Return kind, id and contact times of the contact or wall.
+    """Return kind, id and contact times of the contact or wall that switches the bodies.
 
     Raises
     ------
@@ -373,7 +371,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # The note is also written to the file, which may be used without the card.
+    # The note is also written to the file, because the file may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",
@@ -429,7 +427,7 @@ def _write_sensors(
 def _check_run(
     windows: Sequence[Times], printing: Printing
 ) -> tuple[tuple[Times, ...], list[int], float]:
-    """Return windows, main nodes and end of a run.
+    """Return the windows, the main nodes and the end of a run.
 
     Raises
     ------

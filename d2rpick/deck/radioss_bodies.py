@@ -50,10 +50,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.radioss_rigid import Body
 
-_STAYS: Final = (
-    1  # value of Ikrem with which the starter keeps the nodes in rigid walls
-)
-# Columns of the node group, in the first line below the title.
+# value of Ikrem with which the starter keeps the nodes of a body in rigid walls
+_STAYS: Final = 1
+# Column of the node group in the first line below the title, by keyword of the initial velocity.
 _GROUP_OF_VELOCITY: Final = dict.fromkeys(
     ("TRA", "ROT", "T+G", "GRID"), VELOCITY["grnod_ID"]
 ) | {"AXIS": AXIS_GROUP["grnod_ID"]}
@@ -61,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """Rigid bodies that switch the parts.
+    """The rigid bodies that switch given parts, and the cards of the new ones.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -157,12 +156,12 @@ def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Return True if a body is never rigid; ``unused`` has the main nodes of the bodies that no leg activates."""
+    """Return True if a body is never rigid; ``unused`` are main nodes of bodies that no engine run activates."""
     return body.node.value in unused and not body.sensor
 
 
 def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
-    """Return a remark if the body joins pieces that have no other connection."""
+    """Return a remark if the body of these parts joins pieces that have no other connection."""
     pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
@@ -170,7 +169,7 @@ def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
 
 
 def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Return the parts that have elements other than springs, or all parts if none has."""
+    """Return the parts that have elements other than springs; if there are none, return all parts."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)
@@ -281,7 +280,7 @@ def _has_nodes(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
 
 
 class _BodyWriter:
-    """Writes new bodies with ids that no card of the deck uses."""
+    """Writes new bodies whose ids no card of the deck uses."""
 
     def __init__(
         self, starter: Starter, inventory: Inventory, groups: NodeGroups
@@ -295,7 +294,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return the main node and cards of a new body of given parts, with velocity and gravity for the main node."""
+        """Return main node and cards of a new body of given parts, with velocity and gravity for the main node."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")
@@ -323,7 +322,7 @@ class _BodyWriter:
         return node, "\n".join(lines) + f"\n{moving}"
 
     def next(self, kind: str) -> int:
-        """Return an unused id above all ids of a kind of card."""
+        """Return an unused id above all ids of one kind of card."""
         if kind not in self._free:
             words = (split_keyword(block) for block in self._starter.blocks)
             ids = (
@@ -337,7 +336,7 @@ class _BodyWriter:
         return self._free[kind]
 
     def _centre(self, parts: Sequence[int]) -> Reals:
-        """Return the centre of mass (3,) [length], or the mean of the nodes if a mass is unknown.
+        """Return the centre of mass of some nodes (3,) [length]; if a mass is unknown, return their mean position.
 
         The starter corrects it.
         """
@@ -378,7 +377,7 @@ class _BodyWriter:
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)
 
     def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
-        """Return the nodes of the group in a column of a card, or the nodes that it lists.
+        """Return the nodes of the group in a column of a card, or the nodes that the card lists.
 
         Empty for a card without group.
         """

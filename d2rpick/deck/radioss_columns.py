@@ -10,13 +10,13 @@ from typing import Final
 
 from d2rpick.deck.columns import DataLine, blank, integers, reals, words
 
-_REAL: Final = 20  # width of a real number [characters]
+_REAL: Final = 20  # width of the column of a real number [characters]
 
-# /BEGIN: the version of the input, and a line of units
+# Lines of /BEGIN: the version of the input, and a line of units.
 BEGIN: Final = DataLine(integers("Invers"))
 UNITS: Final = DataLine(words("Mass Length Time", _REAL))
 
-# /RBODY: four lines
+# The four lines of /RBODY.
 RIGID_BODY: Final = DataLine(
     integers("node_ID sens_ID Skew_ID Ispher"),
     reals("Mass", _REAL),
@@ -26,7 +26,7 @@ BODY_INERTIA: Final = DataLine(reals("Jxx Jyy Jzz", _REAL))
 BODY_PRODUCTS: Final = DataLine(reals("Jxy Jyz Jxz", _REAL))
 BODY_FLAGS: Final = DataLine(integers("Ioptoff Iexpams Ifail"))
 
-# /PART: the line below the title, and the additional line of a rigid part (Irigid 1)
+# Lines of /PART: the line below the title, and the additional line of a rigid part (Irigid 1).
 PART: Final = DataLine(
     integers("prop_ID mat_ID subset_ID"), reals("Thick", _REAL), integers("Irigid")
 )
@@ -34,21 +34,21 @@ RIGID_PART: Final = DataLine(integers("node_ID"), blank(40), integers("sens_ID")
 
 MERGE: Final = DataLine(integers("main_ID M_type secon_ID S_type"))
 NODE: Final = DataLine(integers("node_ID"), reals("X Y Z", _REAL))
-# Ids of /GRNOD, /SUBSET and /SURF/PART; the first id of /TH/NODE and of /INIVEL/NODE
+# Line of ids of /GRNOD, /SUBSET and /SURF/PART; it also fits the first id of /TH/NODE and /INIVEL/NODE.
 ID_LIST: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8 ID9 ID10"))
 
-# /RWALL: the line below the title, the distance, and points
+# Lines of /RWALL: the line below the title, the distance, and points.
 WALL: Final = DataLine(integers("node_ID Slide grnd_ID1 grnd_ID2 Iform"))
 WALL_SIZES: Final = DataLine(reals("d fric Diameter", _REAL))
 POINT: Final = DataLine(reals("X Y Z", _REAL))
 
-# /INIVEL with a node group; with AXIS the group has a line of its own above the velocities.
+# Lines of /INIVEL with a node group; with AXIS the group is on a line of its own above the velocities.
 VELOCITY: Final = DataLine(reals("Vx Vy Vz", _REAL), integers("grnod_ID"))
 AXIS_GROUP: Final = DataLine(integers("Dir frame_ID grnod_ID"))
 AXIS_VELOCITY: Final = DataLine(reals("Vx Vy Vz Vr", _REAL))
 VELOCITY_START: Final = DataLine(reals("Tstart", _REAL), integers("sens_ID"))
 
-# /GRAV and the prescribed motions (/IMPVEL, /IMPDISP, /IMPACC), also of FGEO, with the times of the motions
+# Lines of /GRAV and of the prescribed motions /IMPVEL, /IMPDISP and /IMPACC, also with FGEO.
 GRAVITY: Final = DataLine(
     integers("fct_ID"),
     words("Dir"),
@@ -59,7 +59,7 @@ GRAVITY: Final = DataLine(
 MOTION_TIMES: Final = DataLine(reals("Ascale_x Fscale_y Tstart Tstop", _REAL))
 FREE_MOTION: Final = DataLine(integers("fct_ID part_ID"))
 
-# /BCS: three digits for translations and three for rotations, before the skew
+# Line of /BCS: three digits for translations and three for rotations precede the skew.
 SUPPORT: Final = DataLine(
     blank(3),
     words("Tra", 3),
@@ -70,11 +70,11 @@ SUPPORT: Final = DataLine(
 FUNCTION_POINT: Final = DataLine(reals("X Y", _REAL))
 INTERFACE: Final = DataLine(integers("grnod_ID surf_ID"))
 
-# /MAT: density, and the elastic constants below it
+# Lines of /MAT: the density, and the elastic constants below it.
 DENSITY: Final = DataLine(reals("rho", _REAL))
 ELASTIC: Final = DataLine(reals("E nu", _REAL))
 
-# /PROP: flags of solids (of shells: Ishell, Ismstr, Ish3n), thickness of shells, area of beams and trusses, springs
+# Lines of /PROP: flags of solids and shells, thickness of shells, area of beams and trusses, spring constants.
 SOLID_FLAGS: Final = DataLine(
     integers("Isolid Ismstr Icpre Itetra10 Inpts Itetra4 flag7 Iframe")
 )
@@ -84,17 +84,17 @@ SPRING_MASS: Final = DataLine(reals("Mass", _REAL))
 SPRING: Final = DataLine(reals("K C", _REAL))
 SPRING_FUNCTION: Final = DataLine(words("fct_ID1"))
 
-# /SENSOR of each kind: the lines below the title
+# Lines of /SENSOR of each kind below the title.
 DELAY: Final = DataLine(reals("Tdelay", _REAL))
 STOP: Final = DataLine(reals("Tstop", _REAL))
 SENSOR_INPUTS: Final = DataLine(integers("sens_ID1 sens_ID2"))
 FORCE_SENSOR: Final = DataLine(
     integers("ID"), words("Dir"), reals("Fmin Fmax Tmin", _REAL)
 )
-# A second number after Tdelay on the same line, which the solver does not read
+# A second number after Tdelay on the same line, which the solver does not read.
 AFTER_DELAY: Final = DataLine(blank(_REAL), words("number", _REAL))
 
-# /RUN of an engine file
+# Line of /RUN in an engine file.
 RUN: Final = DataLine(reals("Tstop", _REAL))
 
 

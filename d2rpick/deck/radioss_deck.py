@@ -1,4 +1,4 @@
-"""Read keyword blocks of Radioss files: the legs in engine files, the switched bodies, and the starter deck.
+"""Read keyword blocks of Radioss files: engine runs in engine files, switched bodies, and the starter deck.
 
 A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
 for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
@@ -43,16 +43,16 @@ _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
 _DIGITS = 10  # largest number of digits of an id
 
-# Elements whose stresses do not rotate with a rigid body.
+# Kinds of elements whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {
     "TETRA4",
     "TETRA10",
     "BRIC20",
     "SHEL16",
 }
-_RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
+_RIGID_PARTS_SINCE: Final = 2612  # first input version in which /PART has Irigid
 _ICOROTATIONAL: Final = 2  # value of Iframe that selects a co-rotational frame
-# Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
+# Values of Isolid of bricks without a co-rotational frame (12 according to the help up to 2017).
 _NOT_TURNED: Final = {
     1,
     2,
@@ -87,7 +87,7 @@ def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
-    """Return the result of `_find_marks` for a piece of complete lines."""
+    """Return offset and text of the lines in this piece that begin with ``/`` or ``#include``."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
@@ -126,7 +126,7 @@ def make_card(block: Block) -> Card:
 
 
 def get_number(card: Card, at: int = 1) -> int:
-    """Return the id at a position of the keyword; 0 if there is none."""
+    """Return the id at a position of a keyword; 0 if there is no id."""
     return parse_id("".join(card.words[at:][:1]))
 
 
@@ -136,7 +136,7 @@ def get_lines_below_title(card: Card) -> tuple[Row, ...]:
 
 
 class InitialVelocity(NamedTuple):
-    """An /INIV: velocities at the start of a leg for ranges of nodes, or for a node group (0 for none)."""
+    """An /INIV card: velocities at the start of an engine run for ranges of nodes, or for a group (0 for none)."""
 
     card: Card
     ranges: tuple[tuple[int, int], ...]
@@ -151,20 +151,20 @@ class RadiossLeg:
     name: str
     number: int
     stop: Value[float]
-    # For each card: True if it makes bodies rigid, and its main nodes.
+    # For each switching card: True if it makes bodies rigid, and its main nodes.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
     )
     cap: Value[float] | None = None
     version: str = ""
     starts: list[InitialVelocity] = field(default_factory=list)
-    # Sensors that are reset at the start of the leg.
+    # Ids of the sensors that are reset at the start of the engine run.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # id of a sensor that ends the leg at an unknown time
+    sensor: int = 0  # id of a sensor that ends the engine run at an unknown time
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
-    """Read the legs in a file: one, or several if the text contains several printed engine files."""
+    """Read the engine runs in a file, which may contain several printed engine files."""
     legs: list[RadiossLeg] = []
     waiting: list[Card] = []
     for card in map(make_card, read_blocks(source)):
@@ -177,7 +177,7 @@ def read_legs(source: SourceFile) -> list[RadiossLeg]:
 
 
 def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
-    """Return the main nodes that the first leg deactivates and no leg activates, in the order of the file."""
+    """Return the main nodes that the first engine run deactivates and no engine run activates, in file order."""
     is_rigid_in_first_leg: dict[int, bool] = {}
     activated: set[int] = set()
     for index, leg in enumerate(legs):
@@ -195,7 +195,7 @@ def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
 
 
 def _begin_leg(card: Card) -> RadiossLeg:
-    """Begin a leg with its /RUN."""
+    """Begin an engine run with its /RUN card."""
     missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
     return RadiossLeg(
@@ -204,7 +204,7 @@ def _begin_leg(card: Card) -> RadiossLeg:
 
 
 def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
-    """Add a card of an engine file to its leg."""
+    """Add a card of an engine file to its engine run."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(
@@ -227,7 +227,7 @@ def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
 
 
 def _read_start(card: Card) -> InitialVelocity:
-    """Read the nodes of an /INIV: type 0 lists nodes, type 1 first and last node of ranges, type 2 a node group.
+    """Read the nodes of an /INIV; type 0 lists nodes, type 1 ranges of nodes, and type 2 a node group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
@@ -268,7 +268,7 @@ def _make_integer(value: Value[float]) -> Value[int]:
 
 
 class PartLine(NamedTuple):
-    """Title of a /PART, and its ids of property, material and subset."""
+    """Title of a /PART, and the ids of its property, material and subset."""
 
     title: str
     prop: int
@@ -348,7 +348,7 @@ class Starter:
                 )
 
     def _merges(self) -> Iterator[Merge]:
-        """Yield the lines of /MERGE/RBODY."""
+        """Yield the lines of all /MERGE/RBODY cards."""
         for card in self.named("MERGE"):
             for row in (
                 get_lines_below_title(card) if card.words[1:2] == ("RBODY",) else ()
@@ -363,7 +363,7 @@ class Starter:
         return max(self._node_ids(), default=0)
 
     def _node_ids(self) -> Iterator[int]:
-        """Yield the ids of all nodes."""
+        """Yield the ids of all nodes of the deck."""
         column = NODE["node_ID"]
         for card in self.named("NODE"):
             for _, line in card.block.lines():
@@ -394,7 +394,7 @@ class Starter:
 
     @cached_property
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
-        """Return the kind of members of each node group (NODE, PART, SUBSET or GRNOD) and their ids."""
+        """Return, for each node group, the kind of its members (NODE, PART, SUBSET or GRNOD) and their ids."""
         group_cards = (card for card in self.named("GRNOD") if card.words[1:])
         written = {
             get_number(card, 2): (card.words[1], _read_ids(get_lines_below_title(card)))
@@ -415,12 +415,12 @@ class Starter:
     @property
     def moved(self) -> bool:
         """Return True if a submodel may offset ids."""
-        # the keyword //SUBMODEL has no word between its two slashes
+        # The keyword //SUBMODEL has no word between its two slashes.
         return bool(self.named(""))
 
     @property
     def transformed(self) -> bool:
-        """Return True if the deck moves nodes."""
+        """Return True if a card of the deck moves nodes."""
         return bool(self.named("TRANSFORM"))
 
     @property
@@ -431,14 +431,14 @@ class Starter:
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        # if several cards define it, the first card is used
+        # If several cards define it, the solver uses the first card.
         isolid, iframe = defaults[0] if defaults else (0, 0)
         solids = (
             card
             for card in self.named("PROP")
             if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
         )
-        # The flags of each property are read; their line may be blank.
+        # The flags are read by line number, because their line may be blank.
         flags = {
             get_number(card, 2): _read_isolid_and_iframe(card, card.rows[1])
             for card in solids
@@ -488,7 +488,7 @@ class Starter:
         return nodes, parts
 
     def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
-        """Yield the nodes of the deck in ranges, given by pairs of first and last node."""
+        """Yield the nodes of the deck that lie in ranges, given by pairs of first and last node."""
         ranges = [
             range(first, last + 1)
             for first, last in zip(ends[::2], ends[1::2], strict=False)
@@ -514,7 +514,7 @@ class Starter:
 
 
 def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
-    """Return the values of Isolid and Iframe in a line."""
+    """Return the values of Isolid and Iframe on a line."""
     isolid = card.integer(row, SOLID_FLAGS["Isolid"])
     iframe = card.integer(row, SOLID_FLAGS["Iframe"])
     return isolid.value, iframe.value

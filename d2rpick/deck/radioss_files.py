@@ -15,17 +15,17 @@ THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"
 NOT_FOLLOWED: Final = "deck-not-followed"
 LEFT_RIGID: Final = "body-left-rigid"
-# Short text of each flaw that ruins a run, with the rule that explains it.
+# Short text of each flaw that ruins a run, with the rule that explains the flaw.
 RUINS: Final = {
     THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
     AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
     LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
-# number of bytes at the beginning of a file by which it is recognised
+# Number of bytes at the beginning of a file by which the file is recognised.
 HEAD: Final = 256 * 1024
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# Patterns for Radioss files, compiled at first use.
+# These patterns of Radioss keywords are compiled at their first use, to keep start-up fast.
 STARTER: Final = rb"(?mi)^/BEGIN"
 ENGINE: Final = rb"(?mi)^/RUN/"
 _NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
@@ -33,7 +33,7 @@ _NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 
 
 class Flaw(NamedTuple):
-    """A flaw of a run with a stable ``code``, its place and its message.
+    """A flaw of a Radioss run: a stable ``code``, its place and its message.
 
     `NOT_FOLLOWED` says what could not be judged.
     """
@@ -60,19 +60,19 @@ def list_run_files(path: str) -> list[str]:
     file of another name belongs to the run that it names in /BEGIN or /RUN.
     """
     try:
-        if not os.path.isfile(path):  # noqa: PTH113  starts faster
-            return []  # a pipe can be read only once
-        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
-            # reading into a buffer larger than the file takes ten times as long
+        if not os.path.isfile(path):  # noqa: PTH113  pathlib would slow down start-up
+            return []  # A pipe can be read only once.
+        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123  pathlib would slow down start-up
+            # Reading into a buffer larger than the file takes ten times as long.
             head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
         if not is_radioss(head):
             return []
-        from pathlib import Path  # imported here to start faster
+        from pathlib import Path  # Imported here to keep start-up fast.
 
         folder = Path(path).parent
-        file_names = sorted(os.listdir(folder))  # noqa: PTH208  faster than Path objects for many runs
+        file_names = sorted(os.listdir(folder))  # noqa: PTH208  pathlib is slow for many runs
     except (OSError, ValueError):
-        return []  # the reader of the file reports the error
+        return []  # The reader of the file reports this error.
     name = _find_run_name(path, head)
     numbered = (
         re.fullmatch(_NUMBERED, file_name)
@@ -92,12 +92,12 @@ def find_root(path: str) -> str:
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.
     """
-    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  starts faster
+    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  pathlib would slow down start-up
     return numbered[1] if numbered else ""
 
 
 def _find_run_name(path: str, head: bytes) -> str:
-    """Return the name of a run from its file name, else from its content."""
+    """Return the name of a run from its file name, or else from the content of the file."""
     if root := find_root(path):
         return root
     match = re.search(_NAME, head)

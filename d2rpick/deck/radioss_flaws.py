@@ -34,9 +34,10 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import RadiossRun
 
-_PENALTY_SINCE: Final = 2026  # input version from which a wall has Iform
+_PENALTY_SINCE: Final = 2026  # first input version in which a rigid wall has Iform
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
-_WITH_KIND: Final = {"LAGMUL", "THERM"}  # words that may precede the geometry of a wall
+# words that may precede the geometry in the keyword of a rigid wall
+_WITH_KIND: Final = {"LAGMUL", "THERM"}
 
 
 class NodeGroups:
@@ -123,20 +124,20 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
         for flaw in _check_wall(wall, starter, groups, bodies)
     ]
     flaws += [*_check_starts(run, groups, bodies)]
-    # otherwise an include that was not read may contain a velocity
+    # If an include file was not read, it may contain a velocity.
     if not run.deck.unread:
         flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))
 
 
 def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
-    """Return a flaw that says that the nodes of a group are unknown."""
+    """Return a flaw that reports that the nodes of a group are unknown."""
     message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
     return Flaw(NOT_FOLLOWED, field, message)
 
 
 def _name_bodies(bodies: Sequence[Body]) -> str:
-    """Return the names of bodies."""
+    """Return the names of some bodies for a message."""
     return f"/RBODY {', '.join(format_ranges(body.id for body in bodies))}"
 
 
@@ -145,7 +146,7 @@ def _get_body_nodes(body: Body, groups: NodeGroups) -> frozenset[int]:
     return groups.members(body.group) or frozenset()
 
 
-# Rigid walls.
+# The functions below examine rigid walls.
 
 
 def _check_wall(
@@ -209,7 +210,7 @@ def _find_nodes_near_wall(
         if not (ids == node).any():
             return None
         points[0] = coordinates[ids == node][0]
-    with np.errstate(invalid="ignore", over="ignore"):  # some fields are not numbers
+    with np.errstate(invalid="ignore", over="ignore"):  # Some fields are not numbers.
         distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
         return None
@@ -241,13 +242,13 @@ def _compute_distance(
     )
 
 
-# Initial velocities.
+# The functions below examine initial velocities.
 
 
 def _check_velocities(
     run: RadiossRun, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield flaws of bodies with moving nodes whose main node is in no /INIVEL.
+    """Yield the flaws of bodies whose nodes have an initial velocity while their main node is in no /INIVEL.
 
     The starter gives all nodes of a body the velocity of its main node, even if the first leg deactivates the body.
     """
@@ -313,7 +314,7 @@ def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
 def _check_starts(
     run: RadiossRun, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield flaws of bodies that are on in a leg whose /INIV moves their nodes but not their main node."""
+    """Yield the flaws of bodies that are on in an engine run whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
         for _, rigid, nodes in leg.switched:

@@ -106,7 +106,7 @@ _AREA_LINE: Final = {
     "TYPE3": 2,
     "TRUSS": 0,
     "TYPE2": 0,
-}  # number of the line below the title that contains the area
+}  # For each property type: number of the line below the title that contains the area.
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {
     "SPR_GENE",
@@ -125,7 +125,7 @@ _OTHER_SPRINGS: Final = {
 _OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
 _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 
-# Further keywords that connect parts; which parts they connect is not read.
+# Further keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
 _AXES: Final = "XYZ"
@@ -142,7 +142,7 @@ class _Property(NamedTuple):
 
 
 def read_radioss_inventory(run: RadiossRun) -> Inventory:
-    """Return the parts and elements of a run; empty with a note if it has no starter deck."""
+    """Return the parts and elements of a run; without a starter deck, return none and a note."""
     starter = run.starter
     if starter is None:
         return Inventory(
@@ -191,7 +191,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
 
 
 def _find_watched_nodes(starter: Starter) -> Integers:
-    """Return the node ids of /TH/NODE; a title and a line of variables precede them."""
+    """Return the node ids on a /TH/NODE card, below its title and its line of variables."""
     rows = [
         row
         for card in starter.named("TH")
@@ -228,7 +228,7 @@ def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:
 def _collect_parts(
     starter: Starter, mesh: Mesh, rigid: set[int]
 ) -> Mapping[int, PartData]:
-    """Return the data of all parts."""
+    """Return the data of all parts by part id."""
     materials = dict(_collect_materials(starter))
     properties = dict(_collect_properties(starter))
     kinds = mesh.kinds
@@ -257,7 +257,7 @@ def _collect_parts(
 def _choose_material(
     written: Material | None, prop: _Property | None, rigid: bool
 ) -> Material | None:
-    """Return the material of a part: springs have their stiffness in the property, rigid bodies a rigid material."""
+    """Return the material of a part. A spring has its stiffness in the property; a rigid body has a rigid material."""
     if prop and prop.type in _OF_SPRINGS:
         return Material(f"PROP/{prop.type}", "spring")
     if written and rigid:
@@ -266,7 +266,7 @@ def _choose_material(
 
 
 def _find_always_rigid(windows: Sequence[SwitchWindow]) -> set[int]:
-    """Return the parts that are rigid from the start to the end; empty without an engine file."""
+    """Return the parts that are rigid from the start to the end; empty if there is no engine file."""
     return {
         window.unit.id
         for window in windows
@@ -275,7 +275,7 @@ def _find_always_rigid(windows: Sequence[SwitchWindow]) -> set[int]:
 
 
 def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
-    """Yield the id and the material of each /MAT."""
+    """Yield the id and the material of each /MAT card."""
     for card in starter.named("MAT"):
         if len(card.words) < 3:
             continue
@@ -304,7 +304,7 @@ def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
 
 
 def _collect_properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
-    """Yield the id and the property of each /PROP, with the defaults of /DEF_SHELL and /DEF_SOLID."""
+    """Yield the id and the property of each /PROP, completed by the defaults of /DEF_SHELL and /DEF_SOLID."""
     defaults = {
         card.words[0]: _read_flags(card, card.lines)
         for card in starter.named("DEF_SHELL", "DEF_SOLID")
@@ -359,7 +359,7 @@ def _complete_section(
 
 
 def _read_spring_section(rows: Sequence[str]) -> Section:
-    """Read mass and stiffness of a spring; a function of the length replaces the constant stiffness."""
+    """Read mass and stiffness of a spring; the stiffness is not constant if a function is given."""
     linear = len(rows) < 3 or not SPRING_FUNCTION["fct_ID1"].cut(rows[2]).strip(" 0")
     return Section(
         damped=_read_positive(rows, 1, SPRING["C"]) is not None,
@@ -369,7 +369,7 @@ def _read_spring_section(rows: Sequence[str]) -> Section:
 
 
 def _read_shell_section(rows: Sequence[str]) -> Section:
-    """Read the thickness and integration points of a shell; 0 stands for global integration, treated as 1 point."""
+    """Read thickness and integration points of a shell; 0 means global integration, which is treated as 1 point."""
     points = SHELL_SECTION["N"].cut(rows[2]).strip() if len(rows) > 2 else None
     if points is None:
         layers = None
@@ -388,13 +388,13 @@ def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
 
 
 def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float | None:
-    """Read a positive number in a column, or None."""
+    """Read a positive number in a column; return None for anything else."""
     value = parse_real(column.cut(rows[row])) if row < len(rows) else 0.0
     return value if value > 0 else None
 
 
 def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
-    """Return supports, prescribed motion and gravity."""
+    """Return supports, prescribed motion and gravity of a starter deck."""
     if starter.moved and starter.named("GRAV", "BCS", *_MOTIONS):
         return model.Boundary(
             notes=(
@@ -413,11 +413,11 @@ def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
 
 
 def _name_card(card: Card) -> str:
-    """Return the keyword with its file and line."""
+    """Return the keyword of a card with its file and line, for messages."""
     return f"/{card.name} ({card.at})"
 
 
-# Supports and prescribed motion.
+# The functions below read supports and prescribed motions.
 
 
 def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]:
@@ -461,7 +461,7 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
-    """Read a /BCS. Along the axes of a skew it always counts as a support, unless it fixes all translations."""
+    """Read a /BCS card. In local axes it is always treated as a support, unless it fixes all translations."""
     moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
@@ -493,7 +493,7 @@ def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
 def _find_body_holds(
     run: RadiossRun, starter: Starter, holds: Sequence[model.Hold]
 ) -> Iterator[model.Hold]:
-    """Yield supports of all nodes of a rigid body that is on, for each support of its main node."""
+    """Yield a support of all nodes of a rigid body that is on, for each support of its main node."""
     for body in starter.bodies:
         if body.sensor or body.node.value in run.named:
             members = None
@@ -506,7 +506,7 @@ def _find_body_holds(
                 )
 
 
-# Gravity.
+# The functions below read gravity.
 
 
 def _find_gravity(starter: Starter) -> Iterator[model.Gravity | str]:
@@ -535,7 +535,7 @@ def _find_gravity(starter: Starter) -> Iterator[model.Gravity | str]:
 def _read_gravity_card(
     card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]
 ) -> model.Gravity | None:
-    """Read the values and nodes of a /GRAV; None if they are unknown. Gravity is 0 until its sensor is active."""
+    """Read values and nodes of a /GRAV card; None if they are unknown. Gravity is 0 until its sensor is active."""
     row = get_lines_below_title(card)[0]
     function, skew, sensor, group = (
         card.integer(row, GRAVITY[name]).value
@@ -565,7 +565,7 @@ def _read_gravity_card(
 
 
 def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield the id and ordinates of each function; there are no ordinates if the deck scales the function."""
+    """Yield the id and the ordinates of each function; a function that the deck scales has no known ordinates."""
     moved = {get_number(card) for card in starter.named("MOVE_FUNCT") if card.words[1:]}
     for card in starter.named("FUNCT"):
         number = get_number(card)
@@ -580,13 +580,13 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
         )
 
 
-# Joints connect parts without shared nodes: ties, and rigid bodies that are always on.
-# They must be off while a part is rigid, because a node cannot belong to two rigid bodies
-# (Altair's help on incompatible kinematic conditions).
+# Joints connect parts that share no nodes: ties, and rigid bodies that are always on.
+# Joints must be off while a part is rigid, because a node cannot belong to two rigid bodies.
+# Altair's help on incompatible kinematic conditions is the source of this rule.
 
 
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:
-    """Return the tied interfaces (/INTER/TYPE2) whose main surface is one part, and the rigid bodies.
+    """Return the tied interfaces (/INTER/TYPE2) whose main surface belongs to one part, and the rigid bodies.
 
     A rigid body that no engine file and no sensor switches is always on, and connects the parts of its nodes. Without
     engine files all bodies may be switched.

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    Group = tuple[str, tuple[int, ...]]  # kind and ids of the members of a node group
+    # kind of the members of a node group, and their ids
+    Group = tuple[str, tuple[int, ...]]
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
-# First id of node groups that d2rpick adds: larger than any id of a deck.
+# First id of the node groups that d2rpick adds, which is larger than any id of a deck.
 MADE_HERE: Final = 10**10
 
 
@@ -47,7 +48,7 @@ class Body(NamedTuple):
 
 
 class Merge(NamedTuple):
-    """A line of /MERGE/RBODY: the main body and the merged one, each with the kind of its id."""
+    """A line of /MERGE/RBODY: the main body and the body merged into it, each with the kind of its id."""
 
     main_kind: int
     main: int
@@ -56,7 +57,7 @@ class Merge(NamedTuple):
 
 
 class RigidBodies(NamedTuple):
-    """Rigid bodies that the engine knows by their main nodes.
+    """Rigid bodies by their main nodes, as the engine knows them.
 
     ``joined_to`` maps the main node of each merged body, which the engine does not know, to the body that contains it.
     ``groups`` are the node groups that contain merged bodies.
@@ -129,7 +130,7 @@ def make_rigid_bodies(
 def _add_main_nodes(
     in_deck: Sequence[Body], last_node: Callable[[], int]
 ) -> Iterator[Body]:
-    """Yield the bodies; the main nodes that the starter adds are included.
+    """Yield the bodies with their main nodes, some of which the starter adds.
 
     These are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the order of
     the parts in the deck, as their ids are above all others.
@@ -165,7 +166,7 @@ def _join_groups(members: Sequence[Group], groups: dict[int, Group]) -> int:
 
 
 def _add_group(group: Group, groups: dict[int, Group]) -> int:
-    """Add a node group under an unused id and return the id; ids of groups of parts are below twice `MADE_HERE`."""
+    """Add a node group under an unused id above `MADE_HERE`, and return this id."""
     number = 2 * MADE_HERE + len(groups)
     groups[number] = group
     return number

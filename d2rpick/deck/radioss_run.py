@@ -1,4 +1,4 @@
-"""Read a Radioss run: when each part is rigid, by its legs or by time sensors, and which parts stay rigid.
+"""Read a Radioss run: when its engine runs or time sensors make each part rigid, and which parts stay rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
 in later runs unless an engine file changes it.
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, repr=False)
 class RadiossRun:
-    """A Radioss run: its starter deck (if found) and its legs in the order of their numbers.
+    """A Radioss run: its starter deck (if found) and its engine runs in the order of their numbers.
 
     ``deck`` lists its files.
     """
@@ -65,12 +65,12 @@ class RadiossRun:
     deck: Deck
     starter: Starter | None = None
     legs: list[RadiossLeg] = field(default_factory=list)
-    # Includes by path: a file that is included twice is read once.
+    # Include files by path, so that a file that is included twice is read once.
     included: dict[str, SourceFile] = field(default_factory=dict)
 
     @cached_property
     def named(self) -> frozenset[int]:
-        """Return the main nodes that the legs switch."""
+        """Return the main nodes that the engine runs switch."""
         main_nodes: set[int] = set()
         for leg in self.legs:
             for _, _, nodes in leg.switched:
@@ -79,7 +79,7 @@ class RadiossRun:
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """Return the time of the first reset of each sensor (/SENS/RESET), which is the start of a leg [time]."""
+        """Return the time of the first reset of each sensor (/SENS/RESET), at the start of an engine run [time]."""
         first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
@@ -134,7 +134,7 @@ def read_run(path: str, content: bytes | None = None) -> RadiossRun:
 
 
 def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -> None:
-    """Add a file of the starter deck and its includes."""
+    """Add a file of the starter deck and the files that it includes."""
     if run.starter is None:
         return
     run.starter.sources.append(source)
@@ -153,14 +153,14 @@ def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -
 def _read_include(
     card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
 ) -> None:
-    """Add the file that an #include names, or record that it was not read."""
-    from pathlib import Path  # imported here to start faster
+    """Add the file that an #include names, or record why the file was not read."""
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     words = card.block.head.split(maxsplit=1)[1:]
     name = words[0].strip() if words else ""
     folders = (Path(source.name).parent, Path(run.deck.path).parent)
     paths = (str(folder / name) for folder in folders)
-    candidates = (path for path in paths if os.path.isfile(path))  # noqa: PTH113  long names
+    candidates = (path for path in paths if os.path.isfile(path))  # noqa: PTH113  Path.is_file fails on names that are too long
     path, chain = next(candidates, None), (*chain, os.path.realpath(source.name))
     if reason := explain_unread(path, chain):
         run.deck.unread.append(Unread(card.here._replace(text=name), reason))
@@ -173,7 +173,7 @@ def _read_include(
 
 @dataclass(eq=False, repr=False)
 class LegSwitch(SwitchSet):
-    """Bodies that are switched when a leg begins, at time ``at``; ``stop_field`` is the field with that time."""
+    """Bodies that an engine run switches when it begins, at time ``at``; ``stop_field`` contains that time."""
 
     at: float = 0.0
     stop_field: CardField | None = None
@@ -185,7 +185,7 @@ class LegSwitch(SwitchSet):
 
     @property
     def time_field(self) -> CardField:
-        """Return the field with the end of the previous leg, or the keyword in the first leg."""
+        """Return the field with the end of the previous engine run, or the keyword in the first engine run."""
         return self.stop_field or self.card.here
 
 
@@ -199,7 +199,7 @@ class RunWindows:
 
 
 def is_in_order(legs: list[RadiossLeg]) -> bool:
-    """Return True if no leg is missing from the first to the last, and each ends at a known time.
+    """Return True if no engine run is missing from the first to the last, and each ends at a known time.
 
     No leg may end before the previous one.
     """
@@ -220,7 +220,7 @@ def is_in_order(legs: list[RadiossLeg]) -> bool:
 def find_run_windows(
     run: RadiossRun, contacts: Contacts | None = None, forces: Forces | None = None
 ) -> RunWindows:
-    """Return the windows of every body that a leg or a sensor switches.
+    """Return the windows of every body that an engine run or a sensor switches.
 
     A body with unknown parts is one unit, named by its main node.  If the legs are not in order there are no windows.
     For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
@@ -262,7 +262,7 @@ def find_run_windows(
 
 
 def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
-    """Yield the cards of all legs that switch bodies, with their times."""
+    """Yield the cards of all engine runs that switch bodies, with their times."""
     previous: RadiossLeg | None = None
     for leg in legs:
         if previous:
@@ -278,7 +278,7 @@ def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
 
 
 def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
-    """Return the units that a body switches: its parts, or the body itself if its parts are unknown."""
+    """Return what a body switches: its parts, or the body itself if its parts are unknown."""
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [
         Unit(node, is_body=True)
     ]
@@ -287,7 +287,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of a unit of a body, which is on from the start unless the first leg deactivates it."""
+    """Return the windows of one unit of a body, which is rigid from the start unless it is deactivated there."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (
@@ -306,7 +306,7 @@ def _follow_body(
                 and line.to_rigid
                 and events[-1][1].line.to_rigid
             ):
-                events.pop()  # a card that repeats the default switches nothing
+                events.pop()  # An /RBODY/ON at time 0 repeats the default.
             events.append((leg_switch.at or 0.0, SwitchEvent(unit, leg_switch, line)))
     return [
         window
@@ -321,7 +321,7 @@ def find_course(
     contacts: Contacts | None,
     forces: Forces | None = None,
 ) -> Course:
-    """Return what is known of a run that the sensors of its bodies depend on."""
+    """Return the data of a run that determine when the sensors of its bodies are active."""
     has_contacts = (
         contacts is not None
         and parts
@@ -335,7 +335,7 @@ def find_course(
 def _follow_sensor(
     run: RadiossRun, body: Body, parts: dict[int, set[int]], course: Course
 ) -> Iterator[SwitchWindow]:
-    """Yield the windows of a body with a sensor: it is rigid while the sensor is inactive."""
+    """Yield the windows of a body with a sensor, which is rigid while the sensor is inactive."""
     active = find_active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
@@ -403,7 +403,8 @@ def find_rigid_parts(
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
     if incomplete:
-        from d2rpick.deck.mesh import find_parts_within  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.mesh import find_parts_within
 
         for node, parts in find_parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
@@ -411,7 +412,7 @@ def find_rigid_parts(
 
 
 def find_time_units(run: RadiossRun) -> tuple[str, str]:
-    """Return the time units of the starter deck and of the computation, as /BEGIN names them; empty if it does not."""
+    """Return the time units that /BEGIN names for the starter deck and for the computation; empty if it names none."""
     cards = run.starter.named("BEGIN") if run.starter else ()
     rows = next((card.rows for card in cards), ())
     if len(rows) < _LINES_OF_BEGIN:
@@ -424,7 +425,7 @@ def find_time_units(run: RadiossRun) -> tuple[str, str]:
 
 
 def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
-    """Return the parts of the bodies that the first leg deactivates, ascending; empty without a starter deck."""
+    """Return the parts of the bodies that the first engine run deactivates, ascending; empty without a starter deck."""
     nodes = find_bodies_kept_off(run.legs[:1])
     bodies = run.starter.bodies if run.starter else ()
     groups = {
@@ -435,7 +436,7 @@ def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
 
 
 def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
-    """Return the parts of the bodies that are on all the time, because no leg and no sensor switches them.
+    """Return the parts of the bodies that are always on, because no engine run and no sensor switches them.
 
     Without engine files all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
@@ -454,7 +455,7 @@ def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
 
 
 def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
-    """Return the sensor that switches the rigid body of each part, by part."""
+    """Return, by part, the sensor that switches the rigid body of the part."""
     sensors = {
         body.node.value: body
         for body in starter.bodies
@@ -483,7 +484,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies with complete parts that no leg names, in a run with ``windows``.
+    """Return the bodies that contain whole parts and are named by no engine run, in a run with ``windows``.
 
     None if there are none.
     """

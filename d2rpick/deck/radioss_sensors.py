@@ -26,24 +26,23 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
-    # Function that returns the spans in which the force of an interface or rigid wall acts; None if unknown.
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    # Function that returns the time spans in which the force of an interface or rigid wall acts, or None.
     Forces = Callable[[str, int], Spans | None]
 
-# Input version from which a time sensor has an end (Tstop).
+# First input version in which a time sensor has an end (Tstop).
 STOPS_SINCE: Final = 2023
-NEVER: Final = 1e20  # times from this value on are treated as never reached
-# Kinds of force sensors, with the names of their force in histories.
+NEVER: Final = 1e20  # smallest time that is treated as never reached
+# Kinds of force sensors, with the names of their forces in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
-# Types of /INTER that exert no contact force on a flying body: ties, fluids, and parts of other contacts.
+# Types of /INTER that exert no contact force on a flying body, such as ties.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
-_SINGLE: Final = (
-    1e-6  # relative rounding of the times in a T01 file, which have seven digits
-)
+# relative rounding error of the times in a T01 file, which have seven digits
+_SINGLE: Final = 1e-6
 
 
 class Course(NamedTuple):
-    """What is known of a run: its end, its restarts, and when forces act.
+    """Data of a run that determine when sensors are active: its end, its restarts, and when forces act.
 
     The time of the first reset of each sensor, and the spans in which contact forces act [time].
 
@@ -70,7 +69,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Find when a sensor is active: time spans in order, or a string that says what cannot be evaluated.
+    """Return the time spans in which a sensor is active, in order, or a string that says what is unknown.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.
@@ -122,7 +121,7 @@ def find_active_spans(
 def _find_forced_spans(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
-    """Find when a force sensor is active: from the force (or Tmin later) to Tdelay after the force."""
+    """Find when a force sensor is active: from the force (or Tmin later) until Tdelay after the force."""
     keyword = starter.sensors[number].words[1]
     name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
     if len(rows) < 2:
@@ -153,7 +152,7 @@ def _find_forced_spans(
 def find_contacts_of_sensor(
     starter: Starter, number: int, course: Course
 ) -> Spans | None:
-    """Return the spans in which the forces act that a sensor, or one of its inputs, waits for [time].
+    """Return the time spans of the forces for which a sensor, or one of its inputs, waits [time].
 
     None if it waits for none, or if no history shows it.
     """

@@ -69,13 +69,13 @@ _KEPT: Final = (
     *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-# Both paths are relative to the folder of the main deck.
+# The paths on both cards are relative to the folder of the main deck.
 _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
 )
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled at first use
-# Keywords that seem to be switching cards.
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled at its first use, to keep start-up fast.
+# Pattern of keywords that seem to be switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # largest depth of nested includes
@@ -84,7 +84,7 @@ _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Engine keywords that need values: a file whose last line is only such a keyword is truncated.
+# Engine keywords that need values. A file that ends with such a keyword line is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -103,14 +103,14 @@ _WITH_VALUES: Final = (
 
 
 class Unread(NamedTuple):
-    """An include that was not read: its name as written, and the reason."""
+    """An include file that was not read: its name as written, and the reason."""
 
     name: CardField
     reason: str
 
 
 class Restart(NamedTuple):
-    """The start of a restart [time of the run], and the field with that time."""
+    """The start of a restart [time of the run], and the field that contains this time."""
 
     at: float
     stop_field: CardField
@@ -119,7 +119,7 @@ class Restart(NamedTuple):
 def _read_include_card(
     card: Card,
 ) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
-    """Yield, for each file of an ``*INCLUDE`` card, its name, its transform and the transform's unreadable fields.
+    """Yield, for each file on an ``*INCLUDE`` card, its name, its transform and the transform's unreadable fields.
 
     ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
     """
@@ -183,7 +183,7 @@ def _read_transform(
     transform_id = (
         card.integer(rows[3], TRANSFORMATION["TRANID"]) if len(rows) > 3 else None
     )
-    # An unreadable transformation may move nodes.
+    # A transformation that cannot be read may move nodes.
     moved = transform_id is not None and (
         bool(transform_id.problem) or transform_id.value != 0
     )
@@ -194,7 +194,7 @@ def _read_transform(
 
 def _get_folder(file: str) -> Path:
     """Return the folder of a file."""
-    from pathlib import Path  # imported here to start faster
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     return Path(file).parent
 
@@ -222,8 +222,9 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    long: bool = False  # True if the main file is in long format at its end
-    restarts: dict[str, Restart] = field(default_factory=dict)  # restarts by file name
+    long: bool = False  # True if the main file is in long format at its end.
+    # restarts of the run by file name
+    restarts: dict[str, Restart] = field(default_factory=dict)
 
     @property
     def files(self) -> list[str]:
@@ -281,7 +282,7 @@ class Deck:
         return cards_by_file
 
 
-@lru_cache(1024)  # cached, because decks use the same keywords repeatedly
+@lru_cache(1024)  # Decks use the same keywords repeatedly.
 def _list_stems(name: str) -> tuple[str, ...]:
     """Return a name and each of its prefixes that end before an ``_``."""
     return tuple(
@@ -340,9 +341,9 @@ class _Reader:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        # folders named by *INCLUDE_PATH, in the order of the cards
+        # Folders named by *INCLUDE_PATH, in the order of the cards.
         self.folders: list[Path] = []
-        # Files by path, so that a file included twice has one state.
+        # Files by path, so that a file that is included twice is read in one state.
         self.sources: dict[str, SourceFile] = {}
 
     def read(self, source: SourceFile, context: _Context) -> None:
@@ -385,7 +386,7 @@ class _Reader:
             )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
-        """Store a card, or carry out its instruction to the reader."""
+        """Store a card, or follow its instruction to the reader."""
         if card.name.startswith("COMMENT"):
             if re.search(
                 r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",
@@ -426,7 +427,7 @@ class _Reader:
                 )
 
     def find(self, name: CardField) -> str | None:
-        """Return the path of an include as messages should show it, or None.
+        """Return the path of an include file in the form for messages; None if no such file exists.
 
         Programs that read decks disagree whether the folder of the main deck, *INCLUDE_PATH or the folder of the
         including file comes first. All are tried in this order, and the first file found is used.
@@ -436,20 +437,20 @@ class _Reader:
             *self.folders,
             _get_folder(name.file),
         ):
-            # the last spelling decodes the bytes as the file system does, not as Latin-1
+            # The last spelling decodes the bytes as the file system does, instead of as Latin-1.
             for spelling in (
                 name.text,
                 _make_portable(name.text),
                 os.fsdecode(name.text.encode("latin-1", "replace")),
             ):
                 path = str(folder / spelling)
-                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file fails on names that are too long
+                if spelling and os.path.isfile(path):  # noqa: PTH113  Path.is_file fails on names that are too long
                     return path
         return None
 
 
 def explain_unread(path: str | None, chain: Sequence[str]) -> str:
-    """Return why an include is not read, or an empty string.
+    """Return why an include file is not read; empty if it is read.
 
     ``chain`` are the real paths of the files that include it.
     """
@@ -499,7 +500,7 @@ def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
 
 
 def describe_cure(block: Block) -> str:
-    """Return the cure for a file that ends with this block, which `find_cuts` has reported."""
+    """Return what to do about a truncated file that ends with this block."""
     if not block.source.ends_with_line():
         return "use the complete file, or end its last line"
     end_mark = "/END" if block.head.startswith("/") else "*END"
@@ -512,7 +513,7 @@ def has_mesh(block: Block) -> bool:
 
 
 def _has_whole_end(block: Block) -> bool:
-    """Return True if a last line without a line end is complete: a comment, or a keyword that takes no values."""
+    """Return True if an unterminated last line is complete: a comment, or a keyword that takes no values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
         return True

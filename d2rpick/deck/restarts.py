@@ -21,20 +21,21 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Value
 
 _KEYWORD: Final = "RIGID_DEFORMABLE"
-_LARGEST: Final = 1 << 20  # largest size of a small restart [bytes]
+# size of the largest file that may be a small restart [bytes]
+_LARGEST: Final = 1 << 20
 
 
 def is_restart(path: str) -> bool:
     """Return True if a file is a small restart that switches parts."""
     try:
-        if not os.path.isfile(path) or os.path.getsize(path) > _LARGEST:  # noqa: PTH113, PTH202  starts faster
+        if not os.path.isfile(path) or os.path.getsize(path) > _LARGEST:  # noqa: PTH113, PTH202  pathlib would slow down start-up
             return False
-        with open(path, "rb") as file:  # noqa: PTH123
+        with open(path, "rb") as file:  # noqa: PTH123  pathlib would slow down start-up
             if _KEYWORD.encode() not in file.read().upper():
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # the check of the deck reports the error
+        return False  # The check of the deck reports this error.
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
@@ -54,7 +55,7 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     )
     ends = [_find_end(deck) for deck in (main, *legs)]
     known_ends = [end.value for end in ends if end]
-    # the end of the last run may be unknown, because no restart begins there
+    # The end of the last run may be unknown, because no restart begins there.
     timed = all(ends[:-1]) and all(
         end_time < next_end_time for end_time, next_end_time in pairwise(known_ends)
     )

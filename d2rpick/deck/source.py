@@ -23,28 +23,27 @@ if TYPE_CHECKING:
 
 # Number of bytes searched at a time; the buffer is reused and fits into the processor's cache.
 _SEARCHED: Final = 3 << 18
-# number of additional threads: they copy bytes in parallel, but only one thread searches at a time
+# Number of additional threads; they copy bytes in parallel, but only one thread searches at a time.
 _HELPERS: Final = 1
-# number of pieces that one thread searches before a second thread has started
+# Number of pieces that one thread searches before a second thread has started.
 _ALONE: Final = 4
-# number of bytes before a piece that are searched too, for a mark or blanks that cross its border
+# Number of bytes before a piece that are searched again, because a mark may cross the start of the piece.
 _LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-# Offset of a letter that mesh data never contains, so that the search for it is fast.
+# Offset of a letter of the mark that mesh data never contains, so that the search for it is fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 
 _PIECE: Final = 4 << 20  # number of bytes of whole lines that are processed together
-# Line ends are counted in this fraction of a piece, which fits into the processor's cache.
+# Number of parts of a piece in which line ends are counted; each part fits into the processor's cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # number of bytes that are searched for the first line end
-_HEAD: Final = 1024  # number of bytes of a keyword line that are read
-# number of bytes before a keyword that are searched for its comments
+_HEAD: Final = 1024  # number of bytes of a keyword line that are read at most
+# Number of bytes before a keyword that are searched for comments on the keyword.
 _BEFORE: Final = 4096
-_SILENCE: Final = (
-    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled at first use
-)
+# This pattern is compiled at its first use, to keep start-up fast.
+_SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
 
 
 def find_marks(
@@ -69,7 +68,7 @@ def find_marks(
 
 
 class _Search:
-    """A search of a file by several threads, each of which takes the next piece."""
+    """A search of a file by several threads, each of which searches the next piece."""
 
     def __init__(self, file: HeldInMemory | DeckOnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
@@ -92,7 +91,7 @@ class _Search:
         helping.acquire()
         with suppress(
             RuntimeError
-        ):  # no further thread is available, so this one searches alone
+        ):  # No further thread is available, so this one searches alone.
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
@@ -121,9 +120,8 @@ class _Search:
                     )
                 else:
                     marks_by_piece[begin] = ()
-        self._found |= (
-            marks_by_piece  # only now is it certain that the file has not changed
-        )
+        # Only after this check is it certain that the file has not changed.
+        self._found |= marks_by_piece
 
     def stop(self) -> None:
         """Take all remaining pieces from the other threads, and wait until the threads have ended."""
@@ -144,9 +142,8 @@ class _Search:
 
 def _make_compact(offsets: Iterable[int]) -> MutableSequence[int]:
     """Return offsets as an array of 64-bit integers."""
-    from array import (
-        array,
-    )  # not imported at the top of the module, because small files need only a list
+    # numpy is not imported at the top of the module, because small files need only a list.
+    from array import array
 
     return array("q", offsets)
 
@@ -164,7 +161,7 @@ def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Return the position of the next letter after the line that contains ``at``; -1 if there is none."""
+    """Return the position of the next letter after the line that contains ``at``; -1 if there is no such letter."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
@@ -188,7 +185,7 @@ def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 class SourceFile:
-    """One deck file, read as bytes and decoded as Latin-1; all reads belong to one state of the file.
+    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of one state of the file.
 
     ``name`` is the path for messages. ``content`` is given if the content is not in a file or the file is open already.
     ``piece`` bytes are processed together. Line numbers are counted on request: in a large deck counting takes longer
@@ -242,7 +239,7 @@ class SourceFile:
             yield Block(self, start, end, head)
 
     def read(self, start: int, end: int | None = None) -> bytes:
-        """Return the bytes from ``start`` to ``end``, or fewer at the end of the file."""
+        """Return the bytes from ``start`` to ``end``, or up to the end of the file."""
         return self._file.read(start, self._file.size if end is None else end)
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
@@ -258,7 +255,7 @@ class SourceFile:
                 yield piece
                 start += len(piece)
             else:
-                size *= 2  # the line is longer than a piece
+                size *= 2  # The line is longer than a piece.
 
     def text(self, start: int, end: int | None) -> str:
         """Return the bytes from ``start`` to ``end`` as Latin-1 text."""
@@ -294,7 +291,7 @@ class SourceFile:
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules. A large file is not searched for them, so the result is True."""
+        """Return True if comments may silence rules. A large file is not searched for them and gives True."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
@@ -339,9 +336,8 @@ class Block:
         """Return the data lines without comments, each with the number of lines from the keyword line."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
-        if (
-            last and self.end is None
-        ):  # otherwise the block would contain the blanks before the next keyword
+        # Without this line, the block would contain the blanks before the next keyword.
+        if last and self.end is None:
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)
         return [

@@ -18,26 +18,26 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    # Function that copies the bytes between two offsets into a buffer, and returns their number.
+    # Type of a function that copies the bytes between two offsets into a buffer, and returns their number.
     Filling = Callable[[bytearray, int, int], int]
 
 
-# Largest file that is kept in memory [bytes]: a deck may have thousands of includes.
+# Size of the largest file that is kept in memory [bytes]; a deck may have thousands of include files.
 HELD_UP_TO: Final = 1 << 18
 # Smallest number of bytes read at a time, because the next request is mostly for nearby bytes.
 _WINDOW: Final = 1 << 16
-# Number of cached pieces: the ends of the large blocks of a deck are read repeatedly.
+# Number of cached pieces of a file, because the ends of large blocks are read repeatedly.
 _KEPT: Final = 8
 
 
 class HeldInMemory:
-    """Bytes in memory."""
+    """The bytes of a file in memory."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self.size = data, len(data)
 
     def read(self, begin: int, end: int) -> bytes:
-        """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""
+        """Return the bytes from ``begin`` to ``end``, or up to the end of the file."""
         return self._data[begin:end]
 
     @contextmanager
@@ -52,7 +52,7 @@ class HeldInMemory:
 
 
 class DeckOnDisk:
-    """Bytes of a file, read on request; raise DeckError if the file has changed.
+    """The bytes of a file on disk, read on request; raises DeckError if the file has changed.
 
     At least ``window`` bytes are read at a time.
     """
@@ -60,10 +60,11 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        self._windows: dict[int, bytes] = {}  # pieces by offset, the oldest piece first
+        # Pieces of the file by offset, the oldest piece first.
+        self._windows: dict[int, bytes] = {}
 
     def read(self, begin: int, end: int) -> bytes:
-        """Return the bytes from ``begin`` to ``end``, or fewer at the end of the file."""
+        """Return the bytes from ``begin`` to ``end``, or up to the end of the file."""
         end = min(end, self.size)
         if begin >= end:
             return b""
@@ -130,13 +131,13 @@ def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
 def _open_file(name: str) -> FileIO:
     """Open a file; raise DeckError if that fails."""
     try:
-        return open(name, "rb", buffering=0)  # noqa: PTH123  starts faster; the caller closes it
+        return open(name, "rb", buffering=0)  # noqa: PTH123  pathlib would slow down start-up
     except FileNotFoundError:
         raise DeckError(
             f"{name}: no such file; check the name and the folder"
         ) from None
     except (OSError, ValueError) as error:
-        # ValueError is raised for a NUL byte in the name
+        # ValueError is raised for a NUL byte in the name.
         reason = getattr(error, "strerror", None) or error
         raise DeckError(
             f"{name}: cannot be read ({reason}); check the name and the permissions"

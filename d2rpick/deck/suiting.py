@@ -18,7 +18,8 @@ from d2rpick.deck.switching import read_switching
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-_FIRST: Final = 901  # first id of new switch sets and part sets, if it is free
+# first id of new switch sets and part sets, unless the deck uses it
+_FIRST: Final = 901
 
 
 class Suiting(NamedTuple):
@@ -62,7 +63,7 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:
-    """Return the common beginning of the file names of a run, by which the engine finds its restart.
+    """Return the common beginning of the file names of a run, by which the engine finds the restart file.
 
     If the files have no common name, return the name in /RUN.
     """
@@ -89,9 +90,8 @@ def _is_on_parts(
     """Return True if there are constraints and all belong to these parts alone, so that they may be deleted."""
     if not constraints:
         return False
-    from d2rpick.deck.ls_dyna_inventory import (
-        find_first_parts,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_first_parts
 
     cards = find_element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)

@@ -25,7 +25,7 @@ _DELETE, _ACTIVATE = 1, 2
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the D2R lines of given parts or their sets, lead parts first."""
+    """Yield the D2R lines of given parts or their part sets, with lead parts first."""
     yield TO_RIGID.write_names()
     for lead, members in group_by_lead(ids, printing).items():
         yield from (
@@ -37,7 +37,7 @@ def write_rigid_lines(
 def write_deformable_lines(
     ids: Sequence[int], part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the R2D lines of given parts or their set."""
+    """Yield the R2D lines of given parts, or of their part set."""
     yield TO_DEFORMABLE.write_names()
     yield from (
         TO_DEFORMABLE.write(PID=name, PTYPE=kind)
@@ -86,7 +86,7 @@ def write_header(
     waits: Waiting | None = None,
     constraints: Sequence[int] = (0, 0),
 ) -> Iterator[str]:
-    """Yield the header lines of a switch set: TIME1 is ``time``, or the earliest time if the set waits for a force.
+    """Yield the header lines of a switch set; TIME1 is ``time``, or the earliest time if the set waits for a force.
 
     ``counts`` are D2R and R2D. ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
     them.

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 
-BY_TIME, BY_SENSOR = 0, 5  # values of CODE
+BY_TIME, BY_SENSOR = 0, 5  # values of CODE for switches by time and by sensor
 _KINDS: Final[dict[str, Kind]] = {
     "DEFORMABLE_TO_RIGID": "plain",
     "DEFORMABLE_TO_RIGID_AUTOMATIC": "automatic",
@@ -55,12 +55,12 @@ _INERTIA_ROWS: Final = (
 
 
 class Switched(NamedTuple):
-    """One part line: a part, or a part set (``by_set``), that becomes rigid or deformable."""
+    """One part line of a card: a part, or a part set (``by_set``), that becomes rigid or deformable."""
 
     part: Value[int]
     by_set: bool
     to_rigid: bool
-    lead: Value[int] | None = None  # value of LRB, which only D2R lines have
+    lead: Value[int] | None = None  # Value of LRB, which only D2R lines contain.
 
 
 class SwitchHeader(NamedTuple):
@@ -96,14 +96,13 @@ class SwitchSet:
     switched: tuple[Switched, ...]
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
-    part: Value[int] | None = None  # id of the part on *DEFORMABLE_TO_RIGID_INERTIA
-    restart: Restart | None = (
-        None  # the restart that contains the card, if the start time is known
-    )
+    part: Value[int] | None = None  # Id of the part on *DEFORMABLE_TO_RIGID_INERTIA.
+    # The restart that contains the card, if the start time of the restart is known.
+    restart: Restart | None = None
 
     @cached_property
     def time(self) -> float | None:
-        """Return the switching time [time of the whole deck]; None if it does not switch by time."""
+        """Return the switching time [time of the whole deck]; None if the card does not switch by time."""
         if self.restart:
             return self.restart.at
         if self.kind == "plain":
@@ -120,7 +119,7 @@ class SwitchSet:
 
     @property
     def time_field(self) -> CardField:
-        """Return the field with the switching time, or the keyword of a card without one.
+        """Return the field that contains the switching time; for a card without such a field, return the keyword.
 
         It is TIME1, or the end of the run before a restart.
         """
@@ -130,7 +129,7 @@ class SwitchSet:
 
     @property
     def problems(self) -> Iterator[tuple[CardField, str]]:
-        """Return the fields that cannot be read, with the reason."""
+        """Return the fields that cannot be read, each with the reason."""
         return ((value.field, value.problem) for value in self.values if value.problem)
 
 
@@ -150,7 +149,8 @@ def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
     """Yield misspelled switching cards, each with the keyword that was probably intended."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
-            from difflib import get_close_matches  # imported here to start faster
+            # Imported here to keep start-up fast.
+            from difflib import get_close_matches
 
             name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
@@ -244,7 +244,7 @@ def _read_automatic(card: Card) -> SwitchSet:
 
 
 def _describe_missing(rows: Sequence[Row]) -> str:
-    """Return which header lines are missing, or replaced by a part line; empty if none is missing."""
+    """Say which header lines are missing, or replaced by a part line; empty if no header line is missing."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
@@ -260,7 +260,7 @@ def _describe_missing(rows: Sequence[Row]) -> str:
 
 
 def _is_part_line(row: Row) -> bool:
-    """Return True if a line has PTYPE in one of its columns."""
+    """Return True if a line has a PTYPE in one of its columns."""
     return any(
         row.cell(line["PTYPE"].position).upper() in _PTYPES
         for line in (TO_DEFORMABLE, TO_RIGID)
@@ -268,12 +268,12 @@ def _is_part_line(row: Row) -> bool:
 
 
 def _count_lines(count: int) -> str:
-    """Return how many part lines follow, as text."""
+    """Say how many part lines follow the header lines."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
 def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
-    """Read the two header lines."""
+    """Read the two header lines of a switch set."""
     values = card.numbers(first, SWITCH_TIMES) + card.numbers(second, SWITCH_COUNTS)
     swset, code, time1, time2, time3, entno, relsw, *further_values = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
@@ -349,7 +349,7 @@ def _read_part_line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Li
 
 
 def _add_offset(value: Value[int], offset: int) -> Value[int]:
-    """Add the offset of the include to an id; 0 stays 0."""
+    """Add the id offset of the include file to an id; 0 stays 0."""
     if value.problem or not value.value or not offset:
         return value
     return replace(value, value=value.value + offset)
@@ -380,11 +380,11 @@ def _make_switch_set(
     )
 
 
-# Windows.
+# The code below finds the windows in which parts are rigid.
 
 
 class Unit(NamedTuple):
-    """A part, or a part set or a rigid body (by its main node) whose parts are unknown."""
+    """A unit of switching: a part, or a part set or rigid body (by its main node) whose parts are unknown."""
 
     id: int
     is_set: bool = False
@@ -404,7 +404,7 @@ class Unit(NamedTuple):
 
 
 class SwitchEvent(NamedTuple):
-    """A switch of one unit by a line of a card."""
+    """A switch of one unit, made by a line of a card."""
 
     unit: Unit
     by: SwitchSet
@@ -430,7 +430,7 @@ class SwitchWindow(NamedTuple):
 
 
 class Windows(NamedTuple):
-    """All rigid windows of a deck by unit and time; ``orphans`` switch back a unit that was not made rigid before.
+    """All rigid windows of a deck by unit and time; ``orphans`` are switches back of units that were not rigid.
 
     ``other_rigid`` and ``other_deformable`` are units that are switched at unknown times (CODE 1-5, restarts).
     """
@@ -464,7 +464,7 @@ def find_windows(
     windows: list[SwitchWindow] = []
     orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
-        # at equal times the switch back comes first, so that there is no window of length 0
+        # At equal times the switch back comes first, so that there is no window of length 0.
         unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
@@ -483,7 +483,7 @@ def find_windows(
 
 
 def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
-    """Yield the events of a card, one for each part."""
+    """Yield the switches that a card makes, one for each part."""
     for line in card.switched:
         if line.part.problem:
             continue

@@ -1,4 +1,4 @@
-"""Find the parts that must not be switched regardless of their energy, and say why.
+"""Find the parts that must not be switched regardless of their energy, and the reasons.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
 has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.reader import Deck
 
-# Formulations (ELFORM of *SECTION_SOLID) in which material flows through the mesh.
+# Formulations of *SECTION_SOLID (ELFORM) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
-# *MAT keywords of laws with a stress-free reference state, by name and number; numbers may have leading zeros.
+# Patterns of *MAT keywords of laws with a stress-free reference state, by name and by number.
 _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
@@ -49,12 +49,13 @@ _LAWS_WITH_REFERENCE: Final = {
     ),
     *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
 }
-_TOTAL_STRAIN: Final = {10, 11, 12}  # values of Ismstr for solids
+# Values of Ismstr for solids whose stress follows from the total strain.
+_TOTAL_STRAIN: Final = {10, 11, 12}
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
 class Unswitchable(NamedTuple):
-    """Why a part must not be switched.
+    """The reason why a part must not be switched.
 
     ``flows``: its material flows through the mesh, else its law keeps a reference.
     """
@@ -88,7 +89,8 @@ def find_unswitchable_in_ls_dyna(
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
-    from d2rpick.deck.radioss_deck import get_number  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.radioss_deck import get_number
 
     flowing = {
         get_number(card, 2): card.words[0]

@@ -49,13 +49,14 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import PrintedCard
 
-# Engine keywords that a later leg must not repeat: /INIV would set the velocities again.
+# Engine keywords that a later engine run must not repeat; /INIV would set the velocities again.
 _ONCE = {
     "INIV",
     "END",
 }
 
-_NOT_REPEATED: Final = {"RFILE"}  # a leg writes its restart file only at the end
+# An engine run writes its restart file only at its end
+_NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
 
@@ -125,7 +126,7 @@ def write_deck(
 
 
 def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file of an LS-DYNA deck with cards."""
+    """Yield name and content of each file of an LS-DYNA deck that contains the cards."""
     deck = read_deck(main)
     source = SourceFile("the card", card.text.encode())
     if (
@@ -136,9 +137,8 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         raise DeckError(
             f"{main}: an LS-DYNA deck, but the cards are for another solver"
         )
-    for block, sign in find_cuts(
-        deck
-    ):  # the added lines would hide that the file is truncated, and could complete a truncated number
+    # The added lines would hide that the file is truncated, and could complete a truncated number.
+    for block, sign in find_cuts(deck):
         if block.source is deck.sources[0]:
             raise DeckError(
                 f"{deck.path}: {sign} The added cards would hide this: {describe_cure(block)}"
@@ -146,7 +146,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
-        # The suffix - keeps the fields of the card 10 characters wide.
+        # The suffix "-" keeps the fields of the card 10 characters wide.
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
     yield (
         Path(main).name,
@@ -195,9 +195,9 @@ def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
-    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links out of the folder
+    base = os.path.abspath(Path(main).parent)  # noqa: PTH100  resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
-        relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
+        relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100  resolve() would follow links out of the folder
         if not relative.startswith(os.pardir):
             if relative in taken:
                 raise DeckError(
@@ -243,7 +243,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _require_starter(main: str, run: RadiossRun) -> Starter:
-    """Return the starter deck of a run; raise DeckError if it has none, or no engine file."""
+    """Return the starter deck of a run; raise DeckError if the run has no starter deck, or no engine file."""
     if run.starter is None or not run.legs:
         missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
@@ -253,7 +253,7 @@ def _require_starter(main: str, run: RadiossRun) -> Starter:
 
 
 def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
-    """Read the legs of a run in the printed cards; raise DeckError for the cards of another solver."""
+    """Read the engine runs in the printed cards; raise DeckError for the cards of another solver."""
     printed = [
         leg
         for text in card.files.values()
@@ -267,7 +267,7 @@ def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
 def _keep_bodies_off(
     legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
 ) -> Iterator[str]:
-    """Return the lines that keep bodies of the run off in a printed leg; they would be rigid from time 0 otherwise.
+    """Return the lines that keep bodies of the run off in a printed engine run; otherwise they are rigid from time 0.
 
     Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
     """
@@ -277,13 +277,13 @@ def _keep_bodies_off(
         node for node in find_bodies_kept_off(legs) if node not in switched_nodes
     ]
     if printed_leg.cap is None:
-        # The text of a leg without time-step limit ends with an /RBODY/OFF; these lines are appended to that card.
+        # An engine run without time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
         return write_numbers(off_nodes)
     return write_bodies_off(off_nodes)
 
 
 def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
-    """Return the blocks of an engine file that are repeated in a printed leg."""
+    """Return the blocks of an engine file that are repeated in a printed engine run."""
     return b"".join(
         read_block(block)
         for block in read_blocks(leg.run.block.source)
@@ -314,7 +314,7 @@ def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
 
 
 def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
-    """Return a file of the starter deck in which sensors switch bodies; ``sensors`` by main node.
+    """Return a file of the starter deck in which sensors switch bodies; ``sensors`` are given by main node.
 
     Its /BEGIN gets a version in which time sensors have an end.
 
@@ -337,7 +337,7 @@ def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
 def _edit_lines(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Yield a changed line as the offset of its start, the offset of its end, and its new bytes."""
+    """Yield each changed line: the offsets of its start and end, and its new bytes."""
     card = make_card(block)
     for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
@@ -378,7 +378,7 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
 
 
 def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
-    """Raise DeckError if a later leg has keywords that the first leg lacks, so that no leg can represent both."""
+    """Raise DeckError if a later engine run has keywords that the first lacks; no run could represent both."""
     first = {read_block(block) for block in read_blocks(legs[0].run.block.source)}
     for leg in legs[1:]:
         for block in read_blocks(leg.run.block.source):
@@ -415,7 +415,7 @@ def _refuse_other_run(
 
 
 def is_repeated(words: tuple[str, ...], leg: RadiossLeg | EngineFile) -> bool:
-    """Return True if a leg repeats a keyword of the engine file of the run."""
+    """Return True if a printed engine run repeats a keyword of the engine file of the run."""
     if (
         not words
         or words[0] == "RUN"
@@ -437,7 +437,7 @@ def read_block(block: Block) -> bytes:
 
 
 class DrivenDeck(NamedTuple):
-    """A run to be driven: name, end, switched parts, copied files, and the keywords of each leg.
+    """A run to be driven: name, end, switched parts, copied files, and the keywords of each engine run.
 
     ``nodes`` are the main nodes of the rigid bodies of ``parts``, ``others`` are main nodes of bodies that stay off.
     ``interval`` is the output interval of the time history. ``second`` is the length of a second in the time unit of
@@ -458,7 +458,7 @@ class DrivenDeck(NamedTuple):
     def leg(
         self, number: int, until: float, cap: float | None, *, frozen: bool = False
     ) -> bytes:
-        """Return the engine file of a leg; the bodies are rigid if a time-step limit ``cap`` is given.
+        """Return the engine file of an engine run; the bodies are rigid if a time-step limit ``cap`` is given.
 
         ``frozen``: the bodies are rigid already, and must not be activated again, as OpenRadioss would add their energy
         twice.
@@ -494,7 +494,8 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         If it is not a Radioss run with a starter deck and an engine file that defines the interval of the time
         history, or the parts cannot become rigid bodies.
     """
-    from d2rpick.deck.radioss_bodies import find_bodies  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.radioss_bodies import find_bodies
 
     run = read_run(path)
     starter = _require_starter(path, run)
@@ -544,7 +545,7 @@ def _read_end(leg: RadiossLeg) -> float:
 
 
 def _read_interval(leg: RadiossLeg) -> float:
-    """Return the output interval of the time history, which has to show contacts [time]."""
+    """Return the output interval of the time history, in which contacts have to be visible [time]."""
     for block in read_blocks(leg.run.block.source):
         card = make_card(block)
         if (

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from d2rpick.flight.flight import Seen
     from d2rpick.flight.internal_energy import QuietTime
+    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
 # An energy with at least this many turning points may vibrate about a level. With fewer it must be constant.
@@ -50,9 +51,8 @@ def choose_flight(
     seen: Seen,
     described: Described | None,
     quiet: QuietTime | None,
-    *,
-    after: float | None = None,
-    landing: float | None = None,
+    after: float | None,
+    landing: float | None,
 ) -> Flight:
     """Choose the flight around ``td`` from what was found, or as the user gives it; supported parts never fly.
 
@@ -67,7 +67,7 @@ def choose_flight(
         The window that an oscillator or modes describe.
     quiet : QuietTime or None
         The window around td in which the energy shows no load.
-    after, landing : float, optional
+    after, landing : float or None
         End of the load and next contact, if the user gives them [time].
     """
     flight = find_flight(history, seen, described, quiet)
@@ -107,40 +107,53 @@ def find_flight(
     if seen.held:
         return Flight(refusal=seen.refusal)
     if seen.flight:
-        first, last, parts, end_seen, damping, gravity = seen.flight
-        if described and seen.source in BY_ENERGIES and isnan(gravity):
-            gravity = _detect_load_in_window(
-                history, described._replace(start=first, end=last)
-            )
-        end = last if end_seen else None
-        by_oscillator = described is not None
-        return Flight(
-            first,
-            end,
-            seen.source,
-            parts,
-            damping,
-            seen.refusal,
-            seen.doubts,
-            gravity=gravity,
-            described=by_oscillator,
-        )
+        return _make_seen_flight(history, seen, seen.flight, described)
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
     if described:
-        refusal = _explain_why_fed(history, described.start, described.end)
-        if refusal:
-            return Flight(refusal=refusal)
-        load = _detect_load_in_window(history, described)
-        return Flight(
-            described.start,
-            _find_end_of_window(history, described),
-            "oscillator",
-            gravity=load,
-            described=True,
-        )
-    if quiet is None:
-        return Flight()
+        return _make_described_flight(history, described)
+    if quiet:
+        return _make_quiet_flight(history, quiet)
+    return Flight()
+
+
+def _make_seen_flight(
+    history: History, seen: Seen, shown: FreeFlight, described: Described | None
+) -> Flight:
+    """Return the flight that the evidence shows; an oscillator shows whether gravity acts if energies do not."""
+    gravity = shown.gravity
+    if described and seen.source in BY_ENERGIES and isnan(gravity):
+        window = described._replace(start=shown.start, end=shown.end)
+        gravity = _detect_load_in_window(history, window)
+    return Flight(
+        shown.start,
+        shown.end if shown.end_seen else None,
+        seen.source,
+        shown.parts,
+        shown.damping,
+        seen.refusal,
+        seen.doubts,
+        gravity=gravity,
+        described=described is not None,
+    )
+
+
+def _make_described_flight(history: History, described: Described) -> Flight:
+    """Return the window that an oscillator or modes describe as a flight, unless a load does work in it."""
+    refusal = _explain_why_fed(history, described.start, described.end)
+    if refusal:
+        return Flight(refusal=refusal)
+    return Flight(
+        described.start,
+        _find_end_of_window(history, described),
+        "oscillator",
+        gravity=_detect_load_in_window(history, described),
+        described=True,
+    )
+
+
+def _make_quiet_flight(history: History, quiet: QuietTime) -> Flight:
+    """Return the quiet time of the energy as a flight, unless a load does work in it."""
     refusal = _explain_why_fed(history, quiet.start, quiet.td)
     if refusal:
         return Flight(refusal=refusal)

@@ -310,9 +310,7 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
             is_contradicted=partial(_has_flight_by_momentum, history, momenta),
         )
     forces = history.evidence.forces
-    whole = next(
-        (candidate for candidate in history.momenta if candidate.parts is None), None
-    )
+    whole = history.find_momenta(of_parts=False)
     touches = Touches.of(forces, whole) if forces else None
     balance = history.balance
     is_better_known = bool(history.momenta)
@@ -549,10 +547,7 @@ def _explain_why_driven(
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
     """Return True if only some of the model's moving parts fly."""
-    momenta = next(
-        (candidate for candidate in history.momenta if candidate.parts is not None),
-        None,
-    )
+    momenta = history.find_momenta(of_parts=True)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False
     members = {part.id for part in flight.parts}

@@ -307,10 +307,7 @@ def _collect_flying(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
     """Collect the flying parts and their momenta for `find_drift`; None if the part momenta do not show the flight."""
-    momenta = next(
-        (candidate for candidate in history.momenta if candidate.parts is not None),
-        None,
-    )
+    momenta = history.find_momenta(of_parts=True)
     masses = history.masses
     if (
         momenta is None

@@ -1,4 +1,4 @@
-"""Read the energy balance of a run, whose terms have different names in each solver."""
+"""Read the energy balance of a run; each solver uses other names for its terms."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
 
-# For each quantity: the terms of the energy balance that it already contains.
+# Fields of `Balance`, each with the name of its quantity in `d2rpick.histories.names.QUANTITIES`.
 _QUANTITIES: Final[Mapping[str, str]] = {
     "kinetic": "kinetic_energy",
     "hourglass": "hourglass_energy",
@@ -37,7 +37,7 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# Abaqus's total energy is the sum of all energies minus the external work; this difference is constant.
+# Names of a total energy of Abaqus: the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # Quantities of which at least one is needed to judge the health of a run.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
@@ -45,23 +45,23 @@ _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
     "frictional_contact_energy",
     "damping_energy",
 }
-# Normalised names of the energy absorbed by rigid walls, and of the velocities of the whole model.
+# Normalised names of the energy absorbed by rigid walls.
 _WALLS: Final = ("stonewallenergy", "rigidwallenergy")
 _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
-# Normalised names of the spring energy: in Radioss, and in LS-DYNA's glstat and the glstat branch of a binout.
-# In tables these names may have another meaning.
+# Normalised names of the spring energy in Radioss, in LS-DYNA's glstat, and in the glstat branch of a binout.
+# In tables, the names of spring energies may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# A spring energy below this share of the peak internal energy is treated as zero.
-# Single precision and glstat have six digits.
+# Largest spring energy that is treated as zero, as a share of the peak internal energy.
+# The limit corresponds to the six to seven digits of a glstat and of single precision.
 _NONE: Final = 1e-6
-# Smallest spring energy [energy]: LS-DYNA prints 1e-20 for zero.
+# Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
-# Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
+# Tolerance of the sum of the spring energies of parts, as a share of the peak; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
-# A part belongs to a sum if its fitted factor, ideally 0 or 1, is above this value.
+# Smallest fitted factor with which the energy of a part belongs to a sum; ideal factors are 0 and 1.
 _HALF: Final = 0.5
 
 
@@ -109,7 +109,7 @@ def read_momentum(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = float("nan")  # the mass is unknown, or nothing moves
+    mass = float("nan")  # The mass is unknown, or nothing moves.
     if columns.momentum:
         mass = columns.mass(values) or mass
     return Momenta(
@@ -172,7 +172,7 @@ def _find_global_velocities(database: Legs) -> dict[str, str]:
 
 
 class _Columns:
-    """The columns of a database by their meaning, for its first ``states`` states.
+    """The columns of a database by the quantities that they contain, for its first ``states`` states.
 
     A column that is missing, or not in every state, is None.
     """
@@ -181,11 +181,11 @@ class _Columns:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        # becomes True if a momentum is read in place of the velocity
+        # True if a momentum is read in place of the velocity.
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model: as written, or the smallest possible for these momenta (n, 1, 3)."""
+        """Return the mass of the model as written; else the smallest mass possible for these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -195,7 +195,7 @@ class _Columns:
         return float(compute_least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def quantity(self, quantity: str) -> Samples | None:
-        """Return the column of a quantity in `d2rpick.histories.names.QUANTITIES`."""
+        """Return the column that contains a quantity of `d2rpick.histories.names.QUANTITIES`."""
         name = self._database.quantities.get(quantity)
         return None if name is None else self._values(name)
 
@@ -212,7 +212,7 @@ class _Columns:
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
-        """Return the velocity of the centre of mass, up to a factor, shape (n, 3).
+        """Return the velocity of the centre of mass, shape (n, 3); a constant factor may be unknown.
 
         A global velocity is preferred, then a momentum, then any other velocity. A planar one has two of the three
         components.
@@ -238,7 +238,7 @@ class _Columns:
         return None
 
     def _values(self, name: str) -> Samples | None:
-        """Return a column with finite numbers in all states, or None."""
+        """Return a column; None if it is missing, or not all of its values are finite."""
         values = give_if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None
@@ -247,7 +247,7 @@ class _Columns:
 
 
 def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
-    """Stack components (n,) into vectors (n, 3) with 0 for a missing one; None if fewer than two exist."""
+    """Stack components (n,) into vectors (n, 3); a missing component is 0. Return None if fewer than two exist."""
     present = [component for component in components if component is not None]
     if len(present) < 2:
         return None
@@ -308,7 +308,7 @@ def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
 def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies add up to the energy of springs and dampers; () if no parts do.
+    """Return the parts whose energies add up to the energy of springs and dampers; () if there are none.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """

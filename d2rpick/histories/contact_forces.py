@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# A force, or change of an impulse, below this share of the largest one is treated as zero.
-# Single precision has seven digits.
+# Largest force, or change of an impulse, that is treated as zero, as a share of the largest one.
+# Single precision has seven digits, so smaller values are rounding errors.
 _NOTHING: Final = 1e-6
 
 
@@ -86,7 +86,7 @@ class ContactForce(NamedTuple):
 def find_force(
     forces: Sequence[ContactForce], kind: str, number: int
 ) -> ContactForce | None:
-    """Return the force of the contact, interface or rigid wall (``kind``) with a number; None if it is not written."""
+    """Return the force of the contact, interface or rigid wall with this number; return None if it is not written."""
     head = f"{kind} {number}"
     return next(
         (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None
@@ -96,7 +96,7 @@ def find_force(
 def join_contact_forces(
     pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
 ) -> ContactForce:
-    """Join the forces of one contact in the legs of a run; ``keep`` marks the valid states of all legs together.
+    """Join the forces of one contact in all restart segments of a run; ``keep`` marks the valid states.
 
     Between two legs the force acts if it acts just before or after.
     """

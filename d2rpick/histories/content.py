@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # largest file that is kept in memory [bytes]
+_HELD: Final = 1 << 24  # size of the largest file that is kept in memory [bytes]
 _LINES: Final = 1 << 16  # number of bytes in which line ends are counted at a time
-# Number of bytes at each end of a file, by which the file is recognised after it has grown.
+# Number of bytes at each end of a file that are compared to recognise the file after it has grown.
 _END: Final = 1 << 12
 
 
@@ -103,21 +103,21 @@ class OnDisk(Content):
         Its state at rest.
     """
 
-    # Sizes of the chunks that are read at once [bytes].
-    # chunk size for requests of many bytes: a power of 2 that fits into the cache
+    # Sizes of the pieces of a file that are read at once [bytes].
+    # Piece size for requests of many bytes: a power of 2 that fits into the processor's cache.
     block = 1 << 19
-    # largest gap between two fields that are read together, because a system call costs more
+    # Largest gap between two fields that are read together, because a system call costs more than the gap.
     gap = 1 << 13
-    # chunk size for requests of few bytes: the next request is mostly for the bytes that follow
+    # Piece size for requests of few bytes, because the next request is mostly for the bytes that follow.
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
-        from threading import Lock, local  # imported here to start faster
+        from threading import Lock, local  # Imported here to keep start-up fast.
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
         self._lock = Lock()
-        self._own = local()  # each thread has its own buffer and window
+        self._own = local()  # Each thread has its own buffer and window.
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 
@@ -145,7 +145,7 @@ class OnDisk(Content):
         if begin < end and (begin < first or end > first + len(window)):
             if end - begin > self.window:
                 return self.view(begin, end).tobytes()
-            # a backward search needs the bytes before the window
+            # A backward search needs the bytes before the window.
             first = begin if begin >= first else max(0, end - self.window)
             window = self.view(first, min(first + self.window, self._size)).tobytes()
             self._own.window = window, first
@@ -185,7 +185,7 @@ class OnDisk(Content):
         return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
-        """Return an array of ``size`` bytes; small arrays share a buffer, since new memory costs more than reading."""
+        """Return an array of ``size`` bytes; small arrays share a buffer, as new memory costs more than reading."""
         if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
@@ -253,12 +253,12 @@ class OnDisk(Content):
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # a write changes the time first and the size last, so it may be in progress
+            # A write may be in progress, because a write changes the time first and the size last.
             wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        # True if the file has grown, or was renamed
+        # True if the file has grown or was renamed, so that its earlier bytes may be unchanged.
         untouched = now.size > self._size or now.modified == self._state.modified
         if not untouched or self._read_ends() != self._ends:
             problem = f"{self._name}: the file was rewritten while it was read"
@@ -290,8 +290,8 @@ class Scattered(OnDisk):
         self._digest = ""
 
     @cached_property
-    def _own(self) -> local:  # type: ignore[override]
-        """Window of each thread, created at the first use because most files need none."""
+    def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
+        """The window of each thread; it is created at its first use, because most files need no window."""
         from threading import local
 
         return local()
@@ -307,7 +307,7 @@ class Scattered(OnDisk):
     def check(self) -> None:
         """Raise ChangedError unless the file is unchanged or has only grown."""
         try:
-            now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  faster for many files
+            now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  os.stat is faster for many files
         except OSError:
             raise self._shortened() from None
         if not now.continues(self._state):
@@ -330,7 +330,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files that are read at few offsets, once they are not being written.
+    """Return the contents of files that are read at few offsets, after pending writes to them have ended.
 
     Raises
     ------
@@ -349,7 +349,7 @@ def open_content(name: str) -> bytes | OnDisk:
     FormatError
         If it changes all the time, or is a device.
     """
-    with open(name, "rb", buffering=0) as file:  # noqa: PTH123
+    with open(name, "rb", buffering=0) as file:  # noqa: PTH123  pathlib would slow down start-up
         state = read_at_rest(name, file, FormatError, may_grow=True)
         if isinstance(state, bytes):
             return state
@@ -368,7 +368,7 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
         If it was written anew since.
     """
     try:
-        with open(name, "rb", buffering=0) as file:  # noqa: PTH123
+        with open(name, "rb", buffering=0) as file:  # noqa: PTH123  pathlib would slow down start-up
             on_disk = OnDisk(name, os.dup(file.fileno()), state)
     except OSError as error:
         reason = error.strerror or error
@@ -387,7 +387,7 @@ def count_line_number(data: Content, address: int) -> int:
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each offset, shape (n, width)."""
-    # an overlapping view with a field at every offset, from which the fields are indexed
+    # The overlapping view has a field at every offset, so that fields can be selected by index.
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

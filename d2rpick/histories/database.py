@@ -1,4 +1,4 @@
-"""Represent a file of a run as a database of columns that are read on request, and several legs as one database.
+"""Represent a file of a run, and several restart segments, as a database of columns that are read on request.
 
 Databases of different formats that one run wrote are companions; they are checked here for being of one run.
 """
@@ -36,28 +36,28 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest share of the states at which a time may step back. A restart steps back once; other columns do so often.
+# Largest share of the states at which a time may step back. Other columns step back more often than a restart.
 _MOST_BACK: Final = 0.1
 # Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# Output has a gap if an interval is this many times the median interval.
+# An interval between states is a gap in the output if it is this many times the median interval.
 _LONG = 30.0
-# Number of states whose time steps are compared at once, so that they fit into the cache.
+# Number of states whose time steps are compared at once, so that they fit into the processor's cache.
 _PIECE: Final = 1 << 15
-# Databases may belong to one run if this share of the states of the coarser one is at times of the other one.
-# Output intervals may differ, but a solver writes at its own cycles.
+# Smallest share of the times of the coarser database that the other database of the same run also has.
+# A solver writes all databases of a run at its own cycles, even if their output intervals differ.
 _FEWEST = 0.5
-# End times of databases of one run may differ by this number of output intervals: a killed run lacks some states.
+# Largest difference of the end times of databases of one run [output intervals]; a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerances for an internal energy of the parts above the energy of the model.
-# _MORE is relative to the largest energy of the model; in solver files the parts exceed it by less than 0.1 %.
+# Tolerances by which the internal energy of the parts may exceed the energy of the model.
+# _MORE is relative to the largest energy of the model; solver files need less than 0.1 %.
 # _ROUND_OFF is relative to the largest kinetic energy.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one leg of a run, in the units of the run; each reader defines the contents.
+    """The states of one restart segment of a run, in the units of the run; each reader defines what they contain.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -108,7 +108,7 @@ class Database:
 
     @property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of contacts and rigid walls; raises FormatError if they are written but cannot be read."""
+        """Forces of contacts and rigid walls; raises FormatError if the files have forces that cannot be read."""
         return ()
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
@@ -116,7 +116,7 @@ class Database:
         return {}
 
     def branch(self, name: str) -> Database:
-        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError if missing."""
+        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError without it."""
         reason = self.no_channels if name == "glstat" else self.no_parts
         raise FormatError(f"{self.source}: {reason}")
 
@@ -138,7 +138,7 @@ class Database:
         """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
-    def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002
+    def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
         """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
         raise FormatError(f"{self.source}: displacements of nodes are not read from it")
 
@@ -155,16 +155,16 @@ class Database:
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy that the name of a column contains; empty without one."""
+        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
         return find_energy_unit(channel)
 
-    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
-        """Return the precision of the times and of these channels, or of the parts without channels."""
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
+        """Return the precision of the times and of these channels; without channels, that of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 
 class Legs:
-    """The legs of one run, in the order of their start, as one `Database`; in overlaps the newer leg is used.
+    """The restart segments of one run, in order, as one `Database`; in overlaps the newer segment is used.
 
     A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
     are used only if all legs have none.
@@ -181,11 +181,11 @@ class Legs:
         self._own_notes = notes  # notes on files that were not read
         self._named = named  # quantities whose channels have unusual names
         self._files = self._legs = [*legs]
-        if len(legs) > 1:  # the times of a single leg may not be known yet
+        if len(legs) > 1:  # The times of a single restart segment may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
-        # ids and energies of the parts of the last request
+        # Part ids and energies of the most recent request.
         self._energies: tuple[tuple[int, ...], Samples] | None = None
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
@@ -195,7 +195,7 @@ class Legs:
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return where a later read of the files of all legs can begin; empty if they are read completely."""
+        """Return where a later read of the files of the run can begin; empty if they are read completely."""
         points: dict[str, ResumePoint] = {}
         for leg in self._files:
             points |= leg.find_resume_points()
@@ -208,7 +208,7 @@ class Legs:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Columns that all legs have."""
+        """Columns of the whole model that all restart segments have."""
         common = set(self._legs[0].channels)
         for leg in self._legs[1:]:
             common.intersection_update(leg.channels)
@@ -228,22 +228,22 @@ class Legs:
             elif len(names) == 1:
                 channels[quantity] = names[0]
         for quantity, name in self._named:
-            # another database of the run may have the quantity; if none has it, `open_run` raises the error
+            # Another database of the run may have the quantity; if none has it, `open_run` raises the error.
             with suppress(FormatError):
                 channels[quantity] = self.find(name)
         return channels
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that all legs have."""
+        """Parts that all restart segments have."""
         return mark_namesakes(
             part for part in self._legs[0].parts if part.id not in self._passing
         )
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the legs, and on what was left out between them."""
-        # read first, because reading the columns may add notes to the legs
+        """Notes of the restart segments, and on states between them that were left out."""
+        # The columns are read first, because reading them may add notes to the restart segments.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -281,7 +281,7 @@ class Legs:
         return self._legs[0].find(wanted)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy that the name of a column contains."""
+        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
         return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
@@ -289,7 +289,7 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of the given parts; energies are kept read-only, since requests repeat."""
+        """Return a quantity of the given parts; energies are kept, because they are requested repeatedly."""
         if (
             quantity == "internal_energy"
             and self._energies
@@ -307,7 +307,7 @@ class Legs:
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:
-        """Numbers of the nodes whose displacements all legs have."""
+        """Numbers of the nodes whose displacements all restart segments have."""
         common = set(self._legs[0].node_ids)
         for leg in self._legs[1:]:
             common.intersection_update(leg.node_ids)
@@ -320,7 +320,7 @@ class Legs:
         )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the leg with the coarsest numbers."""
+        """Return the precisions of the restart segment whose numbers have the fewest digits."""
         precisions = [leg.precisions(names) for leg in self._legs]
         coarsest_time = min((time for time, _ in precisions), key=_count_digits)
         coarsest_energy = min((energy for _, energy in precisions), key=_count_digits)
@@ -328,7 +328,7 @@ class Legs:
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts and rigid walls that all legs have."""
+        """Forces of the contacts and rigid walls that all restart segments have."""
         legs = [
             {force.name: force for force in leg.contact_forces} for leg in self._legs
         ]
@@ -341,7 +341,7 @@ class Legs:
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:
-        """Ids of the parts that are missing in some legs."""
+        """Ids of the parts that are missing in some restart segments."""
         legs = Counter(part.id for leg in self._legs for part in leg.parts)
         return tuple(id_ for id_, count in legs.items() if count < len(self._legs))
 
@@ -379,7 +379,7 @@ class Legs:
         return keep, (*notes, *unused, *_note_holes(valid_times))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
-        """Join the columns of the legs, without the states that are not valid."""
+        """Join the columns of the restart segments, and remove the invalid states."""
         whole = _join_columns(columns)
         return whole if keep.all() else whole[keep]
 
@@ -398,25 +398,25 @@ def _list_times(database: Database | Legs) -> list[Samples]:
 
 
 def _find_start(leg: Database) -> float:
-    """Return the first time of a leg, -inf if it has no states."""
+    """Return the first time of a restart segment, -inf if it has no states."""
     return min(
         (float(time[0]) for time in _list_times(leg) if time.size), default=-np.inf
     )
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a leg: its start, then its name, regardless of the order of the arguments."""
+    """Return the sort key of a restart segment: its start, then its name, regardless of the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the number of decimals of a precision, or else its number of digits."""
+    """Return the number of decimals of a precision; if there is none, its number of significant digits."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, where a leg may be missing."""
+    """Return notes on long intervals without output; a restart segment may be missing there."""
     if time.size < 4:
         return ()
     pieces = (
@@ -426,7 +426,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    # the usual case, regular output intervals
+    # Output intervals are usually regular, so that no gap has to be searched for.
     if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)
@@ -445,7 +445,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
     try:
         if whole is holder or whole.energy_channel is None:
             return
-    except FormatError:  # an ambiguous energy is reported when it is read
+    except FormatError:  # An ambiguous energy is reported when it is read.
         return
     in_parts, in_model = _find_coincident(
         holder.part_time,
@@ -498,7 +498,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
+    """Return the indices of the times within ``room`` [time] of another time, and the indices of these other times.
 
     Examples
     --------

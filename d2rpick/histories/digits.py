@@ -1,4 +1,4 @@
-"""Round and convert times in the form in which users read and type them: with six digits, optionally with a unit."""
+"""Round and convert times as users read and type them: with six digits, optionally with a unit."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-_DIGITS: Final = 6  # significant digits of a printed time
-# Number of significant digits of a sum of times: more than files have, fewer than a double has.
+_DIGITS: Final = 6  # number of significant digits of a printed time
+# Number of significant digits kept in a sum of times: more than files have, fewer than a double has.
 _EXACT: Final = 12
 
-# Units of time by their names in files and options [s], as strings, because 0.001 is not exact as a double.
+# Sizes of the units of time by their names [s], as strings because 0.001 is not exact as a double.
 _SIZES: Final = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), "1"),
     **dict.fromkeys(("ms", "msec"), "1e-3"),
@@ -31,18 +31,17 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# A time in this first share of a record is assumed to be in another unit.
+# A time converted to ms or us must lie beyond this first share of the record to be plausible.
 _NEVER_MEANT: Final = 0.01
-# If a smaller unit gives a time in this first share, the record more likely ends before the time.
+# A time converted to a smaller unit must lie beyond this first share of the record to be suggested.
 _HARDLY_MEANT: Final = 0.05
-# A td with fewer states before it is assumed to be in another unit, because such a td hardly saves time.
-# Such a td and 1000 times its value are both times of the record only if the record has at least 1000 states,
-# or if this td lies before the second state.
+# A td among this number of first states is assumed to have another unit, because it would hardly save time.
+# A td and 1000 times this td both lie in the record only if the record has 1000 states or more.
 _FIRST_STATES: Final = 10
 
 
 def round_as_read(time: float) -> float:
-    """Return the time that a user types after reading this one.
+    """Return the time that a user types after reading this time with six digits.
 
     Examples
     --------
@@ -53,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the time, or the printed time if it is earlier.
+    """Return the earlier of the time and the time as printed with six digits.
 
     Examples
     --------
@@ -64,7 +63,7 @@ def round_to_first_as_read(time: float) -> float:
 
 
 def sum_times_as_read(time: float, further: float) -> float:
-    """Add two printed times, without the extra digits of a sum of doubles.
+    """Add two printed times without the spurious digits of a sum of doubles.
 
     Examples
     --------
@@ -98,7 +97,7 @@ def round_down_as_read(time: float) -> float:
 
 
 def format_window(start: float, end: float) -> str:
-    """Format a window so that every printed time between its ends is inside. Very short windows get all digits.
+    """Format a window so that its printed ends are within it. A very short window is printed with all digits.
 
     Examples
     --------
@@ -128,7 +127,7 @@ def format_distinctly(numbers: Sequence[float]) -> list[str]:
 
 
 def format_beyond_limit(value: float, limit: float) -> str:
-    """Format a value beyond a limit with three digits, or with as many as show on which side it lies.
+    """Format a value beyond a limit with three digits, or with more digits if three would hide the excess.
 
     Examples
     --------
@@ -159,7 +158,7 @@ def parse_seconds(text: str) -> Decimal | None:
     size = _SIZES.get(typed_time[2]) if typed_time else None
     if typed_time is None or size is None:
         return None
-    from decimal import Decimal  # most times are typed without a unit
+    from decimal import Decimal  # Most times are typed without a unit.
 
     return Decimal(typed_time[1]) * Decimal(size)
 
@@ -186,7 +185,7 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return a question that asks if an argument outside a ``record`` (n,) was given in a smaller unit.
+    """Ask if the times of an argument outside a ``record`` (n,) were given in a smaller unit; return the question.
 
     The question is empty if that does not explain the value.
 
@@ -212,7 +211,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return a question that asks if an argument at the first states of a ``record`` (n,) in ms or us was given in s.
+    """Ask if early times of an argument in a ``record`` (n,) in ms or us were given in s; return the question.
 
     The question is empty if that does not explain the value.
     """
@@ -223,7 +222,7 @@ def ask_for_larger_unit(
 def convert_to_unit_of_record(
     record: Samples, times: Sequence[float], unit: str = ""
 ) -> list[float]:
-    """Convert times among the first ten states of a ``record`` (n,) from s to its ms or us.
+    """Convert times among the first ten states of a ``record`` (n,) from seconds to the unit of the record, ms or us.
 
     Return an empty list if neither 1000 times nor 1,000,000 times their value is a time of the record that a user may
     mean. ``unit`` is the unit of the record if its file names it. The start of the record is the same in any unit.
@@ -245,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # us is tried first: if both units fit, the value in ms would be too early in the record
+    # us is tried first: if both units fit, the value in ms would be too early in the record.
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -254,11 +253,11 @@ def convert_to_unit_of_record(
 
 
 def _scale_times(times: Sequence[float], size: float) -> list[float]:
-    """Multiply times by the size of a unit, without the extra digits of a product of doubles."""
+    """Multiply times by the size of a unit, without the spurious digits of a product of doubles."""
     return [float(f"{time * size:.12g}") for time in times]
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return a question that asks if an argument was meant in a unit, with the values to give instead."""
+    """Return a question that asks if an argument was meant in a unit; it contains the values to give instead."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

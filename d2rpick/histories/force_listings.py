@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
-# Patterns are compiled at their first use, to start faster.
+# These patterns are compiled at their first use, to keep start-up fast.
 _CONTACT_LINE: Final = (
     rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
     + rb" +[xyz] *".join([_NUMBER] * 4)
@@ -37,7 +37,8 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-_HEAD: Final = 1 << 16  # number of bytes that contain the complete legend
+# number of bytes at the start of a file that contain its complete legend
+_HEAD: Final = 1 << 16
 
 
 class _Rows(NamedTuple):
@@ -54,7 +55,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Return the forces of files; several files with the same contact are legs of a run.
+    """Return the forces of files; several files with the same contact are restart segments of a run.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the legs of one contact; in overlaps the newer leg is used."""
+    """Join the restart segments of one contact; in overlaps the newer segment is used."""
     return join_contact_forces(
         pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
@@ -101,7 +102,7 @@ def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Return the line with the largest force at each time. Both sides have the same force, or one side has none."""
+    """Return the line with the largest force at each time: both sides have the same force, or only one side has any."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
@@ -115,7 +116,7 @@ def _read_contact_rows(data: bytes) -> _Rows:
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the lines of an rwforc. If the components are missing, the normal force is the first component."""
+    """Read the lines of an rwforc. If the components are missing, the normal force becomes the first component."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]

@@ -1,4 +1,4 @@
-"""Recognise files in a run folder that are not an energy history, and name the file to use instead.
+"""Recognise files in a run folder that contain no energy history, and name the file to use instead.
 
 Sources: the magic numbers of the formats; ISO/TS 13499 (ISO-MME); the universal file format of SDRC, dataset 58; the
 ASCII databases, d3hsp and messag of LS-DYNA; listings of Radioss; the status file of Abaqus.
@@ -20,8 +20,8 @@ _FROM_FRAME: Final = (
     "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
-# LS-DYNA's ASCII databases without internal energy of the model or its parts.
-# They are recognised by their file names, and by words that only they contain.
+# LS-DYNA's ASCII databases that contain no internal energy of the model or of its parts.
+# ASCII databases are recognised by their file names, and by words that no other database contains.
 _DYNA_DATABASES: Final = (
     ("nodout", rb"n o d a l   p r i n t   o u t"),
     ("elout", rb"e l e m e n t   s t r e s s"),
@@ -71,14 +71,14 @@ _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
 class ForeignFormat(NamedTuple):
-    """A format without an energy history: ``pattern`` matches the first bytes of its files."""
+    """A format that contains no energy history; ``pattern`` matches the first bytes of its files."""
 
     pattern: bytes
     name: str
     cure: str
 
 
-# Formats recognised by their first bytes; specific formats come before general formats.
+# Formats recognised by their first bytes, from the most specific to the most general.
 _BINARY_FORMATS: Final = (
     ForeignFormat(
         rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
@@ -181,7 +181,7 @@ _TEXT_FORMATS: Final = (
 
 
 def refuse_foreign(source: str, head: bytes) -> None:
-    """Raise FormatError for a file of a known format without an energy history.
+    """Raise FormatError for a file of a known format that contains no energy history.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
-    base_name = os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  starts faster
+    base_name = os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  pathlib would slow down start-up
     return base_name if base_name in dict(_DYNA_DATABASES) else ""
 
 

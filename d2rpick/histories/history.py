@@ -24,20 +24,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
-# in quotes, because importing numpy.typing slows down start-up
+# The type is in quotes, because importing numpy.typing would slow down start-up.
 Samples: TypeAlias = "NDArray[np.float64]"
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Largest energy. Squares of larger energies overflow a double, and no system of units has such energies.
+# Largest energy that is accepted; squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Parts slower than this share of the fastest part are at rest. Single precision leaves them a small speed.
+# Largest speed of a part at rest, relative to the fastest part; single precision leaves such speeds.
 _STILL: Final = 1e-6
-# Number of times whose energies are interpolated together, so that the work arrays stay small.
+# Number of times at which the energy is interpolated at once, so that the work arrays stay small.
 _TOGETHER: Final = 1 << 14
 
 
 class Precision(NamedTuple):
-    """The precision of the printed numbers of a column.
+    """The precision with which the numbers of a column were printed.
 
     ``digits`` are the significant digits (17 restore every double); if ``decimals`` is given, the numbers have this
     fixed number of decimals instead.
@@ -47,7 +47,7 @@ class Precision(NamedTuple):
     decimals: int | None = None
 
     def quantum(self, value: float) -> float:
-        """Return the distance between adjacent printable numbers around ``value`` [unit of value].
+        """Return the distance between adjacent printable numbers near ``value`` [unit of value].
 
         Examples
         --------
@@ -63,7 +63,7 @@ class Precision(NamedTuple):
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
 
     def quanta(self, values: Samples) -> Samples:
-        """Return the distance between adjacent printable numbers around each of ``values``, in their shape."""
+        """Return the distance between adjacent printable numbers near each of ``values``, in their shape."""
         if self.decimals is not None:
             return np.full(values.shape, 10.0**-self.decimals)
         sizes = np.abs(values)
@@ -75,7 +75,7 @@ class Precision(NamedTuple):
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
-        """Return the rounding error of printed values: half the quantum of the largest one [unit of the values]."""
+        """Return the rounding error of printed values: half the printed step of the largest value."""
         return self.quantum(float(np.abs(values).max())) / 2
 
 
@@ -84,7 +84,7 @@ EXACT = Precision()
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
-    """Momenta of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); the whole model if ``parts`` is None.
+    """Momenta of ``parts``, or of the model if ``parts`` is None: ``values`` (n, parts, 3) over ``time`` (n,).
 
     ``precision`` is the one of the printed numbers. ``chosen`` are the indices of the parts to switch, ``flying``
     those of the parts known to fly together, if any. ``masses`` has shape (parts,), NaN if unknown; None if no mass
@@ -106,7 +106,7 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Return the same momenta with other parts to switch; stored results are kept."""
+        """Return the same momenta with another choice of parts to switch; stored results are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(copy, "memory", self.memory)
         return copy
@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of the moving parts with these indices [mass]; NaN if one is unknown."""
+        """Return the mass of the moving parts among these indices [mass]; NaN if one mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -178,7 +178,7 @@ def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at ``time``, shape (n,); None for terms that the files do not contain.
+    """Energies of the whole model at ``time``, shape (n,); a term that the files do not contain is None.
 
     ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
     damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
@@ -219,7 +219,7 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Hourglass energy (n,), even if it is part of the internal energy; None if unknown."""
+        """Hourglass energy (n,), even if it is part of the internal energy; None if it is unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
@@ -232,7 +232,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """Data in the files of a run, other than the energy of the parts, that show flights.
+    """Data in the files of a run that show flights, apart from the energy of the parts.
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
@@ -246,16 +246,16 @@ class Given:
     forces: tuple[ContactForce, ...] = ()
     written: Given | None = None
 
-    def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002
-        """Return internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if not written."""
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  subclasses use the argument
+        """Return internal energies of some parts, ``values`` (n, parts) [energy]; None if the files lack them."""
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those of some nodes that are written; None without any."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
         return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if not written."""
+        """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if it is missing."""
         balance = self.balance
         if parts is not None or balance is None or balance.kinetic is None:
             return None
@@ -273,10 +273,9 @@ class History:
     raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
     energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
     energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
-    ends within a state; ``notes`` are for the user; ``files`` were read. If the energy is a sum, ``part_names`` (k,)
-    and ``part_energies`` (n, k) are its terms that are not always zero. ``time_unit`` and ``energy_unit`` are empty
-    unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a file is read at the first
-    request. ``surroundings`` are the forces from outside.
+    ends within a state; ``notes`` are for the user; ``files`` were read. ``time_unit`` and
+    ``energy_unit`` are empty unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a
+    file is read at the first request. ``surroundings`` are the forces from outside.
     """
 
     time: Samples
@@ -290,8 +289,6 @@ class History:
     energy_precision: Precision = EXACT
     time_unit: str = ""
     energy_unit: str = ""
-    part_names: tuple[str, ...] = ()
-    part_energies: Samples | None = None
     evidence: Given = NO_EVIDENCE
     surroundings: Surroundings = UNKNOWN
     complete: bool = True
@@ -319,26 +316,24 @@ class History:
             raise HistoryError(
                 f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}"
             )
-        if self.part_energies is not None:
-            terms = freeze(self.part_energies)
-            expected = (time.size, len(self.part_names))
-            if terms.shape != expected:
-                raise HistoryError(
-                    f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
-                    f"{expected} was expected"
-                )
-            object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, then of the whole model, as far as they are known."""
+        """Momenta of the parts, and then of the whole model, if they are known."""
         return self.evidence.momenta
+
+    def find_momenta(self, *, of_parts: bool) -> Momenta | None:
+        """Return the momenta of the parts, or of the whole model; None if they are not written."""
+        for momenta in self.momenta:
+            if (momenta.parts is not None) is of_parts:
+                return momenta
+        return None
 
     @property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are known, NaN if unknown; None if no mass is known [mass]."""
+        """Masses of the parts whose momenta are known; an unknown mass is NaN, and None means no known mass [mass]."""
         return self.evidence.masses
 
     @property
@@ -363,7 +358,7 @@ class History:
 
     @cached_property
     def step(self) -> float:
-        """Largest output interval [time], which limits the vibration that the record resolves."""
+        """Largest output interval [time], which limits the vibration frequencies that the record resolves."""
         return float(np.max(np.diff(self.time)))
 
     @property
@@ -378,14 +373,14 @@ class History:
 
     @cached_property
     def _turns(self) -> tuple[Samples, NDArray[np.bool_]]:
-        """Times at which the energy turns, and which of them are peaks."""
+        """Times at which the energy turns, and an array that is True for peaks."""
         indices, are_peaks = find_turns(self.energy)
         return self.time[indices], are_peaks
 
     @property
     def left_beside(self) -> str:
-        """A question to the user about later legs in the same folder that were not named; empty if there are none."""
-        # imported here to start faster
+        """A question about later restart segments that the user did not name; empty if the folder has none."""
+        # Imported here to keep start-up fast.
         from d2rpick.histories.source import find_later_legs
 
         legs = find_later_legs(self.source)
@@ -418,9 +413,8 @@ class History:
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
-        if (
-            times[-1] * 1e3 > self.time[-1]
-        ):  # the usual case; only times below 1/1000 of the record need a further check
+        # Usually no time lies below 1/1000 of the record, so that no further check is needed.
+        if times[-1] * 1e3 > self.time[-1]:
             return
         from d2rpick.histories.digits import ask_for_larger_unit
 
@@ -435,15 +429,15 @@ class History:
             )
 
     def energy_at(self, time: float, argument: str = "") -> float:
-        """Return the energy at ``time``, linear between the states; outside, RangeError names ``argument``."""
+        """Return the energy at ``time``, interpolated linearly; a RangeError for other times names ``argument``."""
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        # a slice, because numpy would copy the whole read-only array
+        # A slice is passed, because numpy would copy the whole read-only array.
         cell = slice(index, index + 2)
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
-        """Return the energies at given times within the record, linear between the states, in their shape."""
+        """Return the energies at times within the record, interpolated linearly, in the shape of these times."""
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
@@ -472,7 +466,7 @@ class History:
 
 
 def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a record with one row for each of its times, by name. Part masses have no such rows."""
+    """Return by name the arrays of a record that have one row for each of its times; part masses have no such rows."""
     columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)
@@ -489,14 +483,14 @@ def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]
 def select_states(
     record: Record, states: slice | NDArray[np.bool_ | np.intp]
 ) -> Record:
-    """Return a record with only the selected states. Part masses, which have no row per time, stay the same."""
+    """Return a record with only the selected states. Part masses stay the same, because they do not depend on time."""
     columns = list_columns(record)
     rows: dict[str, Any] = {name: values[states] for name, values in columns.items()}
     return replace(record, **rows)
 
 
 def freeze(values: ArrayLike) -> Samples:
-    """Return values as a read-only array of doubles; they are copied unless they already are a complete one."""
+    """Return values as a read-only array of doubles; a complete array of this kind is not copied."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

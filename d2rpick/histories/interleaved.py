@@ -1,4 +1,4 @@
-"""Recognise and refuse tables with a row for each time and part, which are not a history of one energy."""
+"""Recognise and refuse tables with a row for each time and part, because they contain no single energy history."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# An energy belongs to several parts if it varies more within one time than between times, by this factor.
-# With coarsely printed times the two variations of a single energy are equal.
-# With noise, the first is at most the second times the number of rows per time.
+# An energy belongs to several parts if it varies this many times more from row to row than noise explains.
+# Without noise, a single energy varies as much from row to row as from time to time.
+# Noise multiplies the variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 
@@ -33,7 +33,7 @@ def is_of_several_parts(time: Samples, energy: Samples) -> bool:
 
 
 def find_part_column(columns: Mapping[str, Sequence[object]], rows: int) -> str | None:
-    """Return the first column with the same set of ``rows`` different values at each time; None if there is none.
+    """Return the first column that has the same set of ``rows`` different values at each time; None if there is none.
 
     Examples
     --------

@@ -23,17 +23,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
 
-# Patterns are compiled at their first use by the functions of `re`, to start faster.
+# These patterns are compiled at their first use by the functions of `re`, to keep start-up fast.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
-# Numbers of bytes read at the start (the input) and at the end (the date of the run) of an engine listing.
+# Numbers of bytes that are read at the start and at the end of an engine listing.
 _HEAD, _TAIL = 1 << 20, 1 << 16
 _SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
 _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
-# The last year of the copyright is the year of the build.
+# Pattern of the copyright line, whose last year is the year of the build.
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
-_FIXED: Final = (2026, 1, 13)  # date of the fix of the energy of switched elements
-# Commits of the last weeks before the fix. An engine built from them may show the year of the fix.
+# date on which OpenRadioss corrected the energy of switched elements
+_FIXED: Final = (2026, 1, 13)
+# Commits of the last weeks before this date; an engine built from them may show the year of the correction.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
@@ -72,7 +73,8 @@ _STEP: Final = (
 )
 _TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
 _ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-_SEARCHED: Final = 64 << 20  # number of bytes at the start of a file that are searched
+# number of bytes at the start of a file that are searched for time steps
+_SEARCHED: Final = 64 << 20
 _D3HSP: Final = "d3hsp"
 
 
@@ -92,11 +94,11 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended according to the listing of its last history; None if it is unknown.
+    """Return how a run ended, according to the listing of its last history; None if it is unknown.
 
     A leg that was told to stop has not ended the run, nor has a leg with a next leg.
     """
-    from pathlib import Path  # imported here to start faster
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     match = re.fullmatch(_HISTORY, history)
     if match is None:
@@ -115,7 +117,7 @@ def find_ending(history: str) -> str | None:
 def _read_ends(path: str) -> tuple[bytes, bytes]:
     """Return the first and the last bytes of a file; empty if it cannot be read."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123  starts faster
+        with open(path, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             return stream.read(_HEAD), read_tail(path, _TAIL)
     except (OSError, ValueError):
         return b"", b""
@@ -124,7 +126,7 @@ def _read_ends(path: str) -> tuple[bytes, bytes]:
 def read_tail(path: str, size: int) -> bytes:
     """Return the last bytes of a file; empty if it cannot be read."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123  starts faster
+        with open(path, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             stream.seek(max(os.fstat(stream.fileno()).st_size - size, 0))
             return stream.read()
     except (OSError, ValueError):
@@ -132,7 +134,7 @@ def read_tail(path: str, size: int) -> bytes:
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
-    """Return the evidence that an engine that switches rigid bodies is older than the fix; empty without any."""
+    """Return the evidence that an engine is too old to switch rigid bodies without wrong energies; else empty."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
     commit = re.search(_COMMIT, head)
@@ -148,7 +150,7 @@ def _detect_old_engine(head: bytes, tail: bytes) -> str:
 
 
 class Timing(NamedTuple):
-    """Number of cycles of a leg, and the CPU times of the whole leg and of its elements [s]."""
+    """Number of cycles of a restart segment, and the CPU times of the whole segment and of its elements [s]."""
 
     name: str
     cycles: int
@@ -157,7 +159,7 @@ class Timing(NamedTuple):
 
 
 class ZoneTimes(NamedTuple):
-    """Time per element and cycle over the time of a run, both of shape (n,) [s], [time of the run]."""
+    """CPU time per element and cycle [s], over the time of a run [time]; both have the shape (n,)."""
 
     name: str
     time: Samples
@@ -210,7 +212,7 @@ def is_glstat(path: str) -> bool:
 def _read_listing(path: str) -> bytes:
     """Return the bytes of a file; raise FormatError if the file cannot be read."""
     try:
-        with open(path, "rb") as stream:  # noqa: PTH123
+        with open(path, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             return stream.read()
     except OSError as error:
         raise FormatError(
@@ -219,7 +221,7 @@ def _read_listing(path: str) -> bytes:
 
 
 def find_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing; None without a summary; a missing number gives 0."""
+    """Return the CPU times of a Radioss listing; None if it has no summary. A missing number gives 0."""
     if _SUMMARY not in data:
         return None
     summary = data[data.rindex(_SUMMARY) :]
@@ -232,7 +234,7 @@ def find_radioss_timing(name: str, data: bytes) -> Timing | None:
 
 
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a d3hsp (elapsed times if they are rounded to 0), without initialisation."""
+    """Return the CPU times of a d3hsp without initialisation; elapsed times replace CPU times that are rounded to 0."""
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
     total = re.search(_D3HSP_TOTAL, table)
@@ -249,7 +251,7 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
 def find_printed_steps(
     run: OpenedRun, *neighbours: str
 ) -> dict[int, tuple[float, str]]:
-    """Return the smallest time step of each part, and the name of its source.
+    """Return the smallest time step of each part, and the name of the file that contains it.
 
     Parameters
     ----------
@@ -272,7 +274,7 @@ def find_printed_steps(
 
 
 def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
-    """Yield the part that controls each cycle, with the step printed below it."""
+    """Yield the part that controls the time step of each cycle, and the time step printed below it."""
     for file in run.files:
         part: bytes | None = None
         for line in re.finditer(_STEP, file.data[:_SEARCHED]):
@@ -284,7 +286,7 @@ def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
 
 
 def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
-    """Yield the parts and steps in the table of smallest steps of each d3hsp in the folders of some files."""
+    """Yield parts and time steps from the table of smallest time steps of each d3hsp in the folders of some files."""
     from pathlib import Path
 
     for folder in dict.fromkeys(Path(name).parent for name in names):

@@ -24,13 +24,13 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match, the best first. The name contains only the quantity, or also words for the whole model,
-# or also words for something else.
+# Ranks of a match between a name and a quantity, from the best to the worst.
+# The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
 
-# Words in the name of a quantity that mean the whole model, or only the file or group that contains the quantity.
+# Words that may occur next to the name of a quantity of the whole model.
 _WHOLE_MODEL_WORDS: Final = frozenset(
     {"global", "globals", "globale", "total", "totals", "totale", "totaal", "whole", "complete", "entire", "all",
      "model", "modell", "modele", "modelo", "system", "sys", "sum", "summe", "gesamt", "gesamte", "gesamtes",
@@ -43,36 +43,37 @@ _WHOLE_MODEL_WORDS: Final = frozenset(
 _ENERGY_WORDS: Final = frozenset(
     {"energy", "energies", "energie", "energien", "energia", "energias", "energi", "energii", "energiya", "en"}
 )  # fmt: skip
-# Words that may occur in the name of the time of the states; "wall", "cpu" and "step" may not occur.
+# Words that may occur in the name of the time of the states; "wall", "cpu" and "step" must not occur.
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
-# "2. Kinetic energy", "Curve 2: KE"
+# Pattern of a number before a name, as in "2. Kinetic energy" or "Curve 2: KE".
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
-_SOURCE: Final = re.compile(r"t\d\d")  # a time history file of Radioss, such as T01
-# Last components of a path whose group names the quantity: H5MD and others.
+# Pattern of the name of a Radioss time history file, such as T01.
+_SOURCE: Final = re.compile(r"t\d\d")
+# Names of datasets whose group names the quantity, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-# Datasets next to the values that are not quantities.
+# Names of datasets that lie next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
-# Letters with accents and their replacements, because files often lose accents.
+# Letters with accents and the letters that replace them, because files often lose accents.
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
-_LONGEST_PHRASE: Final = 5  # largest number of words in a name of a quantity
+_LONGEST_PHRASE: Final = 5  # largest number of words in the name of a quantity
 
-# Words that give an internal energy another meaning. KE must be in capitals, because "make" contains "ke".
+# Pattern of words that show a quantity other than the internal energy. KE must be in capitals ("make").
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-# Normalised name of a term that Radioss writes in addition to the kinetic energy.
+# Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
 ROTATION_ENERGY: Final = "rotationenergy"
-# Other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
+# Pattern of other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
@@ -89,7 +90,7 @@ class Meaning(NamedTuple):
 
 
 def _list_phrases() -> Iterator[tuple[str, str]]:
-    """Yield each name of a quantity without accents, and the quantity."""
+    """Yield each name of a quantity, without accents, with the quantity."""
     for quantity, names in {"internal_energy": INTERNAL_ENERGY, **QUANTITIES}.items():
         for name in names:
             yield name.translate(_PLAIN_LETTERS), quantity
@@ -98,9 +99,9 @@ def _list_phrases() -> Iterator[tuple[str, str]]:
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 
-@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
 def find_meaning(name: str) -> Meaning | None:
-    """Return the quantity that a name means, with its rank; None if there is none, or several.
+    """Return the quantity that a name means, with the rank of the match; None if it means none, or several.
 
     The name may be a path: its last step decides, if that means something.
 
@@ -117,7 +118,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # not a path but a name with a slash, such as "total energy / initial energy"
+    # The name is not a path but contains a slash, such as "total energy / initial energy".
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -184,19 +185,19 @@ def is_internal_energy(name: str) -> bool:
 
 
 def is_any_internal_energy(name: str) -> bool:
-    """Return True if a name means internal energy of the model or of something else."""
+    """Return True if a name means an internal energy, of the model or of something else."""
     meaning = find_meaning(name)
     return meaning is not None and meaning.quantity == "internal_energy"
 
 
 def is_total_internal_energy(name: str) -> bool:
-    """Return True if a name means internal energy explicitly of the whole model: "Total internal energy"."""
+    """Return True if a name explicitly means the internal energy of the whole model: "Total internal energy"."""
     meaning = find_meaning(name)
     return meaning is not None and meaning[:2] == ("internal_energy", WHOLE_MODEL)
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that mean only internal energy, or else of all names that mean it.
+    """Return the indices of the names that mean only an internal energy; else of all names that mention one.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -206,9 +207,8 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        is_other = re.search(
-            _OTHER_QUANTITY, name
-        )  # the name of another quantity, such as "dissipated internal energy"
+        # The name of another quantity may contain these words, such as "dissipated internal energy".
+        is_other = re.search(_OTHER_QUANTITY, name)
         if meaning.rank == EXACT:
             exact.append(index)
         elif meaning.rank == WHOLE_MODEL or not is_other:
@@ -231,7 +231,7 @@ def find_quantity(name: str) -> str | None:
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return, for each of `QUANTITIES`, the names of the best rank.
+    """Return, for each of `QUANTITIES`, the names that match it with the best rank.
 
     If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
     the table. A column named "total" contains the total energy if there is a kinetic energy too.
@@ -264,7 +264,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the owner of the only internal energy; () if there are several, or no such words."""
+    """Return the words that name the owner of the only internal energy; () if there are several energies, or none."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
@@ -309,7 +309,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 def _has_name_of_energy(name: str) -> bool:
     """Return True if a name means an energy or work, or resembles the name of one."""
-    # this term is contained in the kinetic energy
+    # The rotational energy is contained in the kinetic energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)

@@ -1,4 +1,4 @@
-"""Interpret the names of columns, units and parts, and find those that the user selects."""
+"""Interpret the names of columns, units and parts, and find the names that the user selects."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _ENERGY_UNITS = frozenset(
      "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
-# Pattern of a unit in brackets: symbols with prefixes, and signs between them ("kg mm^2/ms^2", "N·mm", "-").
+# Patterns of a unit in brackets: symbols with prefixes, and signs between the symbols ("N·mm", "-").
 _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
 
-# Names are normalised, and compared as a whole.
+# Names that mean a time, in normalised form.
 TIME_NAMES: Final = frozenset(
     {"time", "t", "times", "timewhole", "zeit", "temps", "tempo", "tiempo", "tijd", "tid", "czas", "时间", "時間",
      "시간", "время"}
@@ -40,8 +40,8 @@ INTERNAL_ENERGY: Final = frozenset(
      "внутренняяэнергия", "内部エネルギー", "内能", "내부에너지"}
 )  # fmt: skip
 
-# Names of other quantities of the whole model: energies, momentum, velocity and mass of the moving parts.
-# The names come from LS-DYNA's glstat and binout, Radioss, Abaqus, Exodus, lasso-python and several languages.
+# Normalised names of other quantities of the whole model: energies, momentum, velocity and mass.
+# The names of quantities come from LS-DYNA, Radioss, Abaqus, Exodus, lasso-python and several languages.
 # The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
@@ -86,10 +86,9 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
-# A number or range of part ids; a string with more digits is a title.
-_SHORTEST_BEGINNING: Final = (
-    3  # letters from which the beginning of a name identifies it
-)
+# smallest number of letters by which the beginning of a name identifies it
+_SHORTEST_BEGINNING: Final = 3
+# Pattern of a number or range of part ids; a string with more digits is a title.
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
 
 
@@ -156,7 +155,7 @@ def _drop_unit(brackets: re.Match[str]) -> str:
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
-@lru_cache(maxsize=1 << 16)  # cached, because the same names are looked up repeatedly
+@lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
 def normalise_name(name: str) -> str:
     """Reduce a name to its letters and digits, in lower case and without its unit.
 
@@ -253,7 +252,7 @@ def clean_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Return the number after the name of the first file of a family in the name of a file; None if there is none.
+    """Return the number that follows the name of a family's first file in another file name; None if there is none.
 
     Examples
     --------
@@ -341,7 +340,7 @@ def select_parts(
     titled: dict[str, list[Part]] = {}
     for part in parts:
         titled.setdefault(part.title.strip().casefold(), []).append(part)
-    titled[""] = []  # an empty title selects no part
+    titled[""] = []  # An empty title selects no part.
     selected: set[Part] = set()
     for text in wanted:
         selected.update(_match_parts(text, parts, titled, where))
@@ -353,7 +352,7 @@ def _match_parts(
 ) -> Iterator[Part]:
     """Yield the parts that a string selects: one title, or numbers, ranges and titles between commas."""
     whole = titled.get(text.strip().casefold())
-    if whole and "," in text:  # a title may contain a comma
+    if whole and "," in text:  # A title may contain a comma.
         yield _choose_only_part(whole, text, where)
         return
     for piece in text.split(","):
@@ -365,7 +364,7 @@ def _match_parts(
 def _match_piece(
     piece: str, parts: Sequence[Part], titled: Sequence[Part] | None, where: str
 ) -> Sequence[Part]:
-    """Return the parts selected by a number, range or title; ``titled`` are the parts with that title."""
+    """Return the parts selected by a number, range or title; ``titled`` are the parts whose title is this string."""
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:

@@ -1,4 +1,4 @@
-"""Open a run: find the reader of each file by its content."""
+"""Open a run: find the reader of each file by the content of the file."""
 
 from __future__ import annotations
 
@@ -41,21 +41,21 @@ __all__ = [
 # Number of bytes that contain the header of a file and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# upper limit for the length of the legend of an ASCII database [bytes]
+# Upper limit for the length of the legend of an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
-# largest number of unused tables that a note names
+# Largest number of unused tables that a note names.
 _MOST_TABLES: Final = 3
-# characters at the end of the name of a later file of a family
+# Characters at the end of the name of a later file of a family.
 _DIGITS: Final = "0123456789"
 
-# Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
+# Largest difference of energies at a common time of two restart segments, as a share of the largest energy.
 _SAME = 0.01
-# Number of parts whose energies are compared.
+# Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50
 
 
 class Reader(Protocol):
-    """The functions that the module of a reader must define; a table format also defines ``write``."""
+    """The functions that each module of a reader defines; the module of a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
         """Return True if a file with these first bytes has the format of the reader; never raises."""
@@ -63,11 +63,11 @@ class Reader(Protocol):
     def open_legs(
         self, sources: Sequence[Source], selection: Selection
     ) -> Sequence[Database]:
-        """Open files of this format as the legs of one run; raise FormatError if one has another format."""
+        """Open files of this format as the restart segments of one run; raise FormatError if one has another format."""
 
 
 def load_reader(kind: str) -> Reader:
-    """Import the reader of a format, a key of `READERS`."""
+    """Import the reader of a format, which is a key of `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
     )
@@ -76,7 +76,7 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run: files of one format are its legs, files of different formats are companions.
+    """Open the files of one run: files of one format are its restart segments, other files are companions.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def open_run(
 
 
 def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a note on the tables of energies in the folders of ``names``, where only databases of solvers are read."""
+    """Return a note on tables of energies in named folders; they are not read next to solver databases."""
     tables = [table for name in names for table in list_tables_of_folder(name)]
     if not tables:
         return ()
@@ -116,7 +116,7 @@ def open_sources(
     input_format: str = "auto",
     notes_on_names: tuple[str, ...] = (),
 ) -> OpenedRun:
-    """Open the files of one run from their bytes; arguments and errors as in `open_run`.
+    """Open the files of one run from their bytes; arguments and errors are those of `open_run`.
 
     ``notes_on_names`` are about the names by which the files were found.
     """
@@ -157,7 +157,7 @@ def open_sources(
     for kind in FAMILIES:
         later_files |= _find_later_files(kinds.get(kind, ()))
     files = tuple(source for source in (*sources, *with_forces) if source.name in used)
-    # the first file of a family stands for all its files
+    # The first file of a family stands for all its files.
     names = tuple(source.name for source in files if source.name not in later_files)
     reopen = partial(_reopen, files, selection, input_format, notes_on_names)
     return OpenedRun(
@@ -185,7 +185,7 @@ def _reopen(
 def _sort_by_format(
     sources: Sequence[Source], input_format: str
 ) -> tuple[dict[str, list[Source]], list[str]]:
-    """Group the files of a run by format; also return notes on files that match a pattern but are left out.
+    """Group the files of a run by format; also return notes on files that match a pattern but are not used.
 
     Of a pattern, as of a folder, the energy histories are used; a table only if there is no database of a solver. The
     later files of a family have the format of its first file.
@@ -197,7 +197,7 @@ def _sort_by_format(
     """
     formats: dict[str, str] = {}
     foreign: list[tuple[Source, FormatError]] = []
-    # the first file of a family comes before its later files, which end with digits
+    # The first file of a family comes before its later files, whose names end with digits.
     for source in sorted(sources, key=lambda source: source.name[-2:].isdigit()):
         first = formats.get(source.name.rstrip(_DIGITS))
         try:
@@ -245,10 +245,10 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats, those that contain only forces last; raise FormatError if there are no others."""
+    """Return the formats; formats that contain only forces come last. Raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # reading the branch raises the error with the best message about missing data
+        # Reading the branch raises the error with the best message about missing data
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
@@ -271,7 +271,7 @@ def _read_force_listings(
 
 
 def _find_later_files(sources: Sequence[Source]) -> set[str]:
-    """Return the names of the later files of families, whose first file stands for all of them."""
+    """Return the names of the later files of families; the first file of a family stands for all its files."""
     names = {source.name for source in sources}
     return {
         name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names
@@ -281,7 +281,7 @@ def _find_later_files(sources: Sequence[Source]) -> set[str]:
 def _open_legs_of_formats(
     kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
-    """Open the files by format; return the legs of each format, and notes on files that were not used.
+    """Open the files by format; return the restart segments of each format, and notes on files that were not used.
 
     d3plot families exist next to everything that LS-DYNA writes: they are used only if the other files leave
     something out, and if there are other files, a family that cannot be read is not an error.
@@ -358,15 +358,15 @@ def _detect_format(source: Source) -> str:
 
 
 def _refuse_foreign(name: str, head: bytes) -> None:
-    """Raise FormatError for a file of a known format without an energy history."""
-    # imported here to start faster
+    """Raise FormatError for a file of a known format that contains no energy history."""
+    # Imported here to keep start-up fast.
     from d2rpick.histories.foreign import refuse_foreign
 
     refuse_foreign(name, head)
 
 
 def _head_of(source: Source) -> bytes:
-    """Return the first bytes of a file, with bytes after the legend of an ASCII database of LS-DYNA."""
+    """Return the first bytes of a file, and the bytes after the legend if it is an ASCII database of LS-DYNA."""
     head = source.data[:_HEAD]
     if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
         end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
@@ -412,7 +412,7 @@ def check_legs(legs: Sequence[Database]) -> None:
                 are_alike = _is_same_energy(
                     columns(first, shared[0]), columns(second, shared[1])
                 )
-            except FormatError:  # the error is reported when the column is read
+            except FormatError:  # The error is reported when the column is read.
                 continue
             if not are_alike:
                 raise FormatError(
@@ -422,7 +422,7 @@ def check_legs(legs: Sequence[Database]) -> None:
 
 
 def _list_columns_and_parts(leg: Database) -> set[str | int]:
-    """Return the columns and part ids of a leg."""
+    """Return the columns and part ids of a restart segment."""
     return {*leg.channels, *(part.id for part in leg.parts)}
 
 
@@ -451,7 +451,7 @@ def _read_part_energies(leg: Database, states: Indices) -> Samples:
 def _find_shared_states(
     first: Samples, second: Samples
 ) -> tuple[Indices, Indices] | None:
-    """Return the states at common times: all if both legs begin together, else only the start of the later leg."""
+    """Return the indices of common times in two restart segments; only the first of them if one begins later."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
         return None

@@ -82,7 +82,7 @@ class OpenedRun:
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> OpenedRun:
-        """Return the same run with other external forces (``surroundings``)."""
+        """Return the same run with other external forces on its parts (``surroundings``)."""
         return OpenedRun(
             self.sources,
             self.databases,
@@ -100,13 +100,13 @@ class OpenedRun:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that have their own histories."""
+        """The parts whose histories the files contain."""
         holder = self._with_parts()
         return holder.parts if holder else ()
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Notes on files that were not used, with the reasons."""
+        """Notes on files that were not used, each with the reason."""
         return self._notes
 
     @cached_property
@@ -151,7 +151,7 @@ class OpenedRun:
     def momenta(
         self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
     ) -> tuple[Momenta, ...]:
-        """Return the momenta of the parts and of the whole model, as far as they are written.
+        """Return the momenta of the parts and of the whole model, if the files contain them.
 
         ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
         """
@@ -167,14 +167,14 @@ class OpenedRun:
         return tuple(momenta for momenta in (of_parts, of_whole) if momenta)
 
     def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
-        """Return the parts without supports, or all parts if each has one."""
+        """Return the parts that have no support; if each part has one, return all parts."""
         return [
             part for part in parts if not self.surroundings.supports_of([part])
         ] or parts
 
     @cached_property
     def _part_momenta(self) -> Momenta | None:
-        """Momenta of all parts; None unless they are written for all parts."""
+        """Momenta of all parts; None unless the files contain the momenta of all parts."""
         holder = self._with_parts()
         if holder is None:
             return None
@@ -184,7 +184,7 @@ class OpenedRun:
             )
         )
         if values is None or not values.size:
-            # a database without all momenta cannot show which parts fly together
+            # A database that lacks some momenta cannot show which parts fly together.
             return None
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
@@ -200,7 +200,7 @@ class OpenedRun:
 
     @cached_property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are written, in the order of the momenta; NaN if unknown [mass].
+        """Masses of the parts whose momenta are written, in the order of the momenta; NaN if a mass is unknown [mass].
 
         As written, or momentum over velocity along the axis with most momentum; None if neither is written.
         """
@@ -254,7 +254,7 @@ class OpenedRun:
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
-        """Momentum of the whole model, or its velocity; None if neither is written."""
+        """Momentum of the whole model, or its velocity; None if the files contain neither."""
         from d2rpick.histories.balance import read_momentum
 
         for database in self.databases:
@@ -264,7 +264,7 @@ class OpenedRun:
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those of some nodes that are written; None without any."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
         for database in self.databases:
             written = [id_ for id_ in database.node_ids if id_ in ids]
             if written:
@@ -282,7 +282,7 @@ class OpenedRun:
 
     @property
     def part_time(self) -> Samples:
-        """Times of the states of the parts with their own histories [time]."""
+        """Times of the states in the histories of the parts [time]."""
         return self._holder().part_time
 
     @cached_property
@@ -291,7 +291,7 @@ class OpenedRun:
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
-        # the energies are missing in some states
+        # The energies are missing in some states.
         energies = give_if_written(lambda: self.part_energies(parts)) if parts else None
         if energies is None:
             return ()
@@ -302,11 +302,11 @@ class OpenedRun:
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if not written."""
+        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if they are missing."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
-        """Return the quantities of the whole model written at ``time`` (n,), by their names in `QUANTITIES`."""
+        """Return the quantities of the whole model that are written at ``time`` (n,), by name."""
         columns: dict[str, Samples] = {}
         for database in self.databases:
             if not database.channels or not np.array_equal(database.time, time):
@@ -315,7 +315,7 @@ class OpenedRun:
                 if quantity in database.quantities and quantity not in columns:
                     with suppress(
                         FormatError
-                    ):  # the quantity is missing in some states
+                    ):  # The quantity is missing in some states.
                         name = database.quantities[quantity]
                         columns[quantity] = database.channel(name)
         return columns
@@ -334,7 +334,7 @@ class OpenedRun:
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
-        """Return the history of the selected energy, without evidence."""
+        """Return the history of the selected energy, without other data that show flights."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
@@ -353,10 +353,10 @@ class OpenedRun:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """Return the database with parts; if there is none, FormatError names what exists instead."""
+        """Return the database with parts; if there is none, raise a FormatError that names what the files contain."""
         holder = self._with_parts()
         if holder is None:
-            # the database raises the error with the best message about missing parts
+            # The first database raises the error with the best message about missing parts.
             self.databases[0].part_channel("internal_energy", ())
             raise FormatError(
                 f"{self.name}: no parts with histories of their own; let the run write them"
@@ -370,13 +370,14 @@ class OpenedRun:
     def _of_parts(
         self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
     ) -> History:
-        """Return the history of the summed energy of parts, without springs unless only they have energy."""
+        """Return the history of the summed energy of parts; springs are added only if no other part has energy."""
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        if not energies[:, ~left_out].any():  # true if only springs have energy
+        # Only springs have energy.
+        if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [
             part
@@ -398,12 +399,10 @@ class OpenedRun:
         history = self._history_of(
             holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen
         )
-        return _add_terms(
-            replace(history, springs=tuple(compress(chosen, left_out))), names, energies
-        )
+        return replace(history, springs=tuple(compress(chosen, left_out)))
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the whole model without the energy of springs and dampers, unless there is no other."""
+        """Return the history of the whole model without the energy of springs and dampers, if there is other energy."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -446,12 +445,9 @@ class OpenedRun:
         channel = " + ".join(names)
         notes = note_other_quantity(channel)
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
-        history = self._history_of(
+        return self._history_of(
             database, database.time, energy, channel, names, notes, None
         )
-        if len(columns) == 1:
-            return history
-        return _add_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Return the database that has all these channels, and their names in it."""
@@ -459,7 +455,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # the database raises the error with the best message about missing channels
+                    # A database without channels raises the error with the best message about missing channels.
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
@@ -470,7 +466,7 @@ class OpenedRun:
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip
-        """Return a history of this energy (n,) with the names and precisions of its database."""
+        """Return the history of an energy (n,) with the names and precisions of its database."""
         time_precision, energy_precision = database.precisions(names)
         return History(
             time=time,
@@ -497,7 +493,7 @@ def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
 
 
 class _Written(Given):
-    """The data in the files of a run that show the flights of given parts, read on request."""
+    """The data in the files of a run that show the flights of given parts; they are read on request."""
 
     def __init__(
         self,
@@ -509,7 +505,7 @@ class _Written(Given):
 
     @cached_property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, then of the whole model."""
+        """Momenta of the parts, and then of the whole model."""
         return self._run.momenta(self._chosen, self._flying)
 
     @cached_property
@@ -530,7 +526,7 @@ class _Written(Given):
         return read_terms(self._run.databases)
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those of some nodes that are written; None without any."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
         return self._run.displacements(ids)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
@@ -549,7 +545,7 @@ class _Written(Given):
 
 
 def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
-    """Return the channels used as the energy, and all other channels with an internal energy."""
+    """Return the channels used as the energy, and all other channels that contain an internal energy."""
     if selection.energy:
         passed_over = filter(is_any_internal_energy, database.channels)
         return [*(database.find(name) for name in selection.energy), *passed_over]
@@ -573,15 +569,3 @@ def _compute_median_of_nonzero(values: Samples) -> Samples:
 def _note_left_out_springs(springs: str) -> str:
     """Return the note on the energy of springs that is left out."""
     return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"
-
-
-def _add_terms(history: History, names: Sequence[str], energies: Samples) -> History:
-    """Add the terms (n, k) of an energy, except terms that are always zero; a single term is returned unchanged."""
-    active = np.flatnonzero(energies.any(axis=0))
-    if active.size < 2:
-        return history
-    return replace(
-        history,
-        part_names=tuple(names[i] for i in active.tolist()),
-        part_energies=energies[:, active],
-    )

@@ -1,4 +1,4 @@
-"""Compute with sampled curves: valid states, integral, level crossings, turning points, outline, roots."""
+"""Compute with sampled curves: valid states, integrals, level crossings, turning points, outlines, roots."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# If at least this share of the states repeats the previous time, a table may have a row for each part.
+# Smallest share of states that repeat the previous time in a table with a row for each part.
 _REPEATED: Final = 0.49
-# smallest number of times: with fewer times, equal times in several rows may be a coincidence
+# Smallest number of times that is examined; with fewer, equal times in several rows may be a coincidence.
 FEWEST_TIMES: Final = 3
-# Ratio of output intervals before and after a restart; other curves or unsorted tables exceed it.
+# Largest ratio of output intervals before and after a restart; other curves and unsorted tables exceed it.
 _ALIKE = 2.0
-# Number of adjacent windows that are combined into one; 8 keeps the table small and quick to search.
+# Number of adjacent windows that are combined into one window of the next level of the search table.
 _TOGETHER: Final = 8
 # A root has converged if it moves by less than this share of its time, which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
@@ -42,7 +42,7 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and last of the times (n,), which identify a window of a record; empty if there are none."""
+    """Return the first and last of the times (n,), which identify a window of a record; () if there are no times."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 
@@ -82,7 +82,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    # gives the same as mean(), which is slow for few values
+    # The sum is used instead of mean(), which is slow for few values.
     t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
@@ -114,7 +114,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # the usual case: ascending times
+    if np.all(time[1:] > time[:-1]):  # Usually all times ascend.
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
     equal = int(np.count_nonzero(step == 0))
@@ -141,7 +141,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
 
 
 def count_rows_per_time(time: Samples) -> int:
-    """Return the median number of rows with the same time (n,); 1 if most times occur in one row only.
+    """Return the median number of rows that share a time (n,); 1 if most times occur in one row only.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def count_rows_per_time(time: Samples) -> int:
 
 
 def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
-    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they are not those of one run."""
+    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they are not of one run."""
     state = _find_wrong_step_back(time)
     if state is None:
         return time
@@ -174,7 +174,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
 
 
 def _find_wrong_step_back(time: Samples) -> int | None:
-    """Return the first state at which times (n,) step back other than by a restart; None if there is none.
+    """Return the first state at which times (n,) step back and no restart explains it; None if there is none.
 
     One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
     the median) is half to twice the median interval before it.
@@ -200,7 +200,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median of the positive time steps; NaN if there are none. Equal printed times are not counted."""
+    """Return the median of the positive time steps, without equal printed times; NaN if there are no such steps."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 
@@ -208,7 +208,7 @@ def _compute_median_step(steps: Samples) -> float:
 def find_crossings(
     time: Samples, energy: Samples, level: float
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """Return the times at which ``energy`` crosses ``level``, ascending, and which of them rise, both of shape (k,).
+    """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of rising crossings.
 
     Between samples the energy is linear: for piecewise linear data the result is exact to rounding. The energy
     crosses the level if it is on different sides before and after:
@@ -237,7 +237,7 @@ def find_crossings(
     turn = np.flatnonzero(np.diff(side[off_level]))
     index_before = off_level[turn]
     index_after = off_level[turn + 1]
-    # if samples lie on the level, the crossing is at the first of them, which is a share of 1
+    # If samples lie on the level, the crossing is at the first of them.
     share = np.where(
         index_after == index_before + 1,
         (level - energy[index_before])
@@ -256,7 +256,7 @@ def find_crossings(
 
 
 def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return the indices at which the energy (n,) turns, and which of them are peaks, both of shape (k,).
+    """Return the indices (k,) at which the energy (n,) turns, and a mask (k,) of the peaks.
 
     A flat top or bottom is one turn, at its first sample; the ends are no turns.
 
@@ -272,12 +272,12 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
 
 
 def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
-    """Return 1 where values (n,) are above the limits, -1 where they are below, else 0; one byte each saves memory."""
+    """Return 1 where values (n,) are above the limits, -1 where they are below, else 0, as 1-byte integers."""
     return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
 def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
-    """Return the slices of consecutive ``states`` (n,) that are True, if they have at least ``fewest`` states.
+    """Return slices of at least ``fewest`` consecutive ``states`` (n,) that are True.
 
     Examples
     --------
@@ -295,7 +295,7 @@ def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, .
 def find_first_above(
     values: Samples, start: NDArray[np.intp], limit: Samples
 ) -> NDArray[np.intp]:
-    """Return the index of the first of values (n,) from each ``start`` on above its ``limit``, in their shape (m,).
+    """For each ``start``, return the index of the first of values (n,) from there on above its ``limit``, (m,).
 
     The index is n if there is none. The search takes O((n + m) log n).
 
@@ -304,7 +304,7 @@ def find_first_above(
     >>> find_first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
-    # tops[i] is the largest of ``_TOGETHER**i`` values from each index on
+    # Element i of ``tops`` contains the largest of ``_TOGETHER**i`` values from each index on.
     tops = [np.append(values, np.inf)]
     width = 1
     indices = np.arange(values.size + 1)
@@ -324,7 +324,7 @@ def find_first_above(
 
 
 def merge_times(*times: Samples) -> Samples:
-    """Return the distinct times in ascending order. The function of numpy would import numpy.ma.
+    """Return the distinct times in ascending order. numpy.unique is not used, because it imports numpy.ma.
 
     Examples
     --------

@@ -21,25 +21,26 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# File names of LS-DYNA's d3 families: the job name, the name of the family, and the number of the file.
+# Pattern of the file names of LS-DYNA's d3 families: job name, name of the family, number of the file.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
-# File names of force listings, which are used next to files with energies.
+# Pattern of the file names of force listings, which are read together with files that contain energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
-_BLOCK = 1 << 16  # number of packed bytes unpacked at a time; they become at most 68 MB
-# Smallest similarity of a suggested file name. It is high because the same suffix makes names similar.
+# Number of packed bytes that are unpacked at a time; they become at most 68 MB.
+_BLOCK = 1 << 16
+# Smallest similarity of a suggested file name, which is high because equal suffixes make names similar.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table whose first bytes contain this word is probably an energy history.
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
 
-# A name and the number of the leg after it: runT01, binout0001, glstat02; the first leg may have no number.
+# Pattern of a file name with the number of its restart segment (runT01, binout0001), if there is one.
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
 class Source(NamedTuple):
-    """The unpacked bytes of one file (a large file stays on disk), under the name that the user gave it.
+    """The unpacked bytes of one file, in memory or on disk, under the name that the user gave the file.
 
     ``cut`` is True if packed data ends early: ``data`` is what could be unpacked of ``packed``. ``by_pattern`` is
     True if a pattern or folder matched the file, rather than its name.
@@ -65,7 +66,7 @@ class Source(NamedTuple):
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
-    """Replace folders and globs by their files, and otherwise keep the order.
+    """Replace folders and patterns with the files that they contain or match, and otherwise keep the order.
 
     Of a folder only databases of solvers are used, and they must belong to one run.
 
@@ -86,7 +87,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # the files of a family are checked at each read
+    families = _open_families(files)  # The files of a family are checked at each read
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -110,9 +111,9 @@ def open_files(names: Sequence[str]) -> list[Source]:
 
 
 def _open_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open the files of families by name; only small parts of them are read."""
+    """Open the files that belong to families by their names; only small parts of these files are read."""
     family = re.compile(_FAMILY)
-    in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
+    in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119  pathlib would slow down start-up
     try:
         sources = {
             name: Source(name, data)
@@ -121,16 +122,16 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
     except OSError as error:
         raise _report_unread(error.filename, error) from None
     for name, source in sources.items():
-        # a later file may be empty: a solver opens it before it writes a state
+        # A later file may be empty, because a solver opens it before it writes a state.
         if not source.data and not name[-1].isdigit():
             raise _report_empty(name)
     return sources
 
 
 def _look_at_state(name: str) -> FileState | None:
-    """Return the state of a regular file; None for anything else."""
+    """Return the state of a regular file; None for any other kind of file."""
     try:
-        status = os.stat(name)  # noqa: PTH116  starts faster
+        status = os.stat(name)  # noqa: PTH116  pathlib would slow down start-up
     except (OSError, ValueError):
         return None
     if name == STDIN or not stat.S_ISREG(status.st_mode):
@@ -139,7 +140,7 @@ def _look_at_state(name: str) -> FileState | None:
 
 
 def open_source(name: str) -> Source:
-    """Read a file, or standard input for ``-``; unpack gzip data.
+    """Read a file, or standard input for the name ``-``, and unpack gzip data.
 
     Raises
     ------
@@ -159,16 +160,16 @@ def _report_empty(name: str) -> FormatError:
 
 
 def _list_files(name: str) -> Sequence[str]:
-    """Return the files of a name: a file with the later files of its family, or those of a folder or pattern."""
-    # os.path is used instead of pathlib to start faster
-    if name == STDIN or os.path.isfile(name):  # noqa: PTH113
+    """Return the files of a name: a file with the later files of its family, or the files of a folder or pattern."""
+    # os.path is used instead of pathlib to keep start-up fast.
+    if name == STDIN or os.path.isfile(name):  # noqa: PTH113  pathlib would slow down start-up
         return [name, *_list_later_files(name)]
     from pathlib import Path
 
     path = Path(name)
     try:
         is_folder = path.is_dir()
-    except OSError:  # a name that is too long is reported when it is opened
+    except OSError:  # A name that is too long is reported when the file is opened.
         return [name]
     if is_folder:
         return _list_databases(path)
@@ -188,13 +189,13 @@ def _is_pattern(name: str) -> bool:
 
 
 def _list_later_files(name: str) -> Sequence[str]:
-    """Return the later files of a family in ascending order: the name of its first file stands for all."""
+    """Return the later files of a family in ascending order; the name of its first file stands for all of them."""
     folder, first = os.path.split(name)
     match = re.fullmatch(_FAMILY, first)
     if match is None or match["number"]:
         return []
     try:
-        siblings = os.listdir(folder or ".")  # noqa: PTH208  starts faster
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up
     except OSError:
         return []
     numbers: dict[str, int] = {}
@@ -203,11 +204,11 @@ def _list_later_files(name: str) -> Sequence[str]:
         if number is not None:
             numbers[sibling] = number
     in_order = sorted(numbers, key=numbers.__getitem__)
-    return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118
+    return [os.path.join(folder, sibling) for sibling in in_order]  # noqa: PTH118  pathlib would slow down start-up
 
 
 def _list_databases(folder: Path) -> list[str]:
-    """Return the databases of solvers in a folder; raise FormatError unless they belong to one run."""
+    """Return the solver databases in a folder; raise FormatError unless they belong to one run."""
     runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
     databases = {file: run for file, run in runs_of_files.items() if run}
     if not databases:
@@ -226,8 +227,8 @@ def _list_databases(folder: Path) -> list[str]:
 
 
 def list_tables_of_folder(name: str) -> list[str]:
-    """Return the CSV files with energies in a folder, which is read without them; empty if ``name`` is no folder."""
-    if name == STDIN or not os.path.isdir(name):  # noqa: PTH112  starts faster
+    """Return the CSV files with energies in a folder that are not read; empty if ``name`` is not a folder."""
+    if name == STDIN or not os.path.isdir(name):  # noqa: PTH112  pathlib would slow down start-up
         return []
     from pathlib import Path
 
@@ -239,7 +240,7 @@ def list_tables_of_folder(name: str) -> list[str]:
 
 
 def _read_head(file: Path) -> bytes:
-    """Return the beginning of a file; nothing if it cannot be read."""
+    """Return the first bytes of a file; empty if it cannot be read."""
     try:
         with file.open("rb") as opened:
             return opened.read(_HEAD_OF_TABLE)
@@ -248,7 +249,7 @@ def _read_head(file: Path) -> bytes:
 
 
 def _find_run(file: Path) -> str:
-    """Return the name of the run in the file name of a solver's database; empty for any other file."""
+    """Return the name of the run in the file name of a solver database; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
     for listed in READERS.values():
@@ -281,7 +282,7 @@ def _read_file(name: str) -> bytes | OnDisk:
     except (
         OSError,
         ValueError,
-    ) as error:  # a name with a NUL character raises ValueError
+    ) as error:  # A name with a NUL character raises ValueError.
         raise _report_unread(name, error) from None
 
 
@@ -298,7 +299,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question with a similar file name in the folder, or a hint if the name is a time; otherwise empty."""
+    """Return a question with a similar file name in the folder, a hint if the name is a time, or an empty string."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
@@ -307,20 +308,20 @@ def _suggest_file(name: str) -> str:
         )
     folder, wanted = os.path.split(name)
     try:
-        siblings = os.listdir(folder or ".")  # noqa: PTH208  starts faster
+        siblings = os.listdir(folder or ".")  # noqa: PTH208  pathlib would slow down start-up
     except OSError:
         return ""
     return suggest_name(wanted, siblings, _LIKENESS)
 
 
 def _unpack(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack gzip data, as far as they are complete, within the limits of memory."""
+    """Unpack gzip data as far as they are complete, within the limits on memory."""
     import zlib
 
     data = bytes(packed)
     try:
         if len(data) * bound("RATIO") > bound("UNPACKED"):
-            # the size is checked before memory is used for the data
+            # The size is checked before memory is used for the data.
             _unpack_pieces(name, data, keep=False)
         pieces, cut = _unpack_pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
@@ -342,7 +343,7 @@ def _unpack_pieces(
 
     pieces: list[bytes] = []
     size = 0
-    unpacker = zlib.decompressobj(wbits=31)  # 31 selects the gzip format
+    unpacker = zlib.decompressobj(wbits=31)  # The value 31 selects the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         unread = packed[end - _BLOCK : end]
         while unread:
@@ -361,8 +362,8 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return unnamed files in the folders of these files with the same name and a higher number."""
-    from pathlib import Path  # imported here to start faster
+    """Return the files next to these files that have the same name with a higher number and were not named."""
+    from pathlib import Path  # Imported here to keep start-up fast.
 
     legs: list[str] = []
     for name in names:
@@ -381,7 +382,8 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of the leg, 0 without a number."""
+    """Split a file name into its stem and the number of its restart segment, which is 0 without a number."""
     match = _NUMBERED.fullmatch(name)
-    assert match is not None  # never None, because the pattern matches any text
+    # The match is never None, because the pattern matches any text
+    assert match is not None
     return match[1], int(match[2] or 0)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Support(NamedTuple):
-    """A support or a prescribed motion, by name and place, that acts from ``start`` to ``end`` [time]."""
+    """A support or a prescribed motion with its name and place; it acts from ``start`` to ``end`` [time]."""
 
     name: str
     start: float = 0.0
@@ -36,7 +36,7 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Return the possible accelerations by gravity of given parts, or of the model; None if they are unknown."""
+        """Return the possible gravity accelerations of given parts, or of the model; None if they are unknown."""
         accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 
@@ -77,5 +77,5 @@ UNKNOWN = Surroundings()
 
 
 def _list_ids(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
-    """Return the ids of parts; None stands for the model."""
+    """Return the ids of parts; None stands for the whole model."""
     return (None,) if parts is None else tuple(part.id for part in parts)

@@ -1,4 +1,4 @@
-"""Read contact forces in the columns of a table, which are recognised by name."""
+"""Read contact forces from the columns of a table, which are recognised by their names."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NO_FORCE: Final = r"(?i)energy|work|moment|ratio"
 
 
 def find_forces(database: Legs) -> tuple[ContactForce, ...]:
-    """Return the contact forces of a database; in a table, each column named as a contact force is one."""
+    """Return the contact forces of a database; in a table, each column named as a contact force is one force."""
     if READERS[database.format].solver:
         return database.contact_forces
     names = [

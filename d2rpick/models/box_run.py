@@ -11,7 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.base.workers import choose_farm, count_cores
-from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.history import EXACT, Given, History, Momenta, Track
 from d2rpick.histories.names import Part
 from d2rpick.models.box_motion import BoxMotion
 
@@ -306,8 +306,25 @@ def run_to(motion: BoxMotion, time: float) -> None:
         motion.move()
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class BoxEvidence(Given):
+    """The momenta of box and step, and the internal energy of each, as the ``matsum`` of a run contains them.
+
+    ``part_energies`` holds the energies, ``values`` of shape (n, 2) [J].
+    """
+
+    part_energies: Track | None = None
+
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:
+        """Return internal energies of box or step, ``values`` of shape (n, parts) [J]."""
+        if self.part_energies is None:
+            return None
+        time, values = self.part_energies
+        return Track(time, values[:, [part.id - 1 for part in parts]])
+
+
 def make_history(record: Record) -> History:
-    """Return the history of the energy of the box, with the momenta of both parts."""
+    """Return the history of the energy of the box, with the momenta and energies of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
     momentum = np.stack(
         [record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2
@@ -319,7 +336,10 @@ def make_history(record: Record) -> History:
         format="rollover",
         channel="internal energy of box",
         parts=parts[:1],
-        evidence=Given((Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),)),
+        evidence=BoxEvidence(
+            (Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),),
+            part_energies=Track(record.time, record.internal_energy),
+        ),
         time_unit="s",
     )
 

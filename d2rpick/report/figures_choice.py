@@ -346,14 +346,25 @@ def _label_window(number: int, window: Times, span: float) -> str:
     return f"{number}: tr = {tr:.4g}, td = {td:.4g}"
 
 
-def draw_run(history: History, flights: Sequence[Times]) -> Figure:
-    """Draw the energy of a run as far as it can be trusted, and its flights."""
+def draw_run(
+    history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
+) -> Figure:
+    """Draw the energy of a run as far as it can be trusted, its flights, and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
+    rigid = np.any(
+        [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
+    )
     axes.plot(
-        history.time, history.energy, color=REFERENCE, linewidth=1, label="energy"
+        history.time,
+        np.where(rigid, np.nan, history.energy),
+        color=REFERENCE,
+        linewidth=1,
+        label="energy",
     )
     for flight in flights:
         mark_span(axes, flight, "flight")
+    for window in windows:
+        axes.axvspan(*window, ymax=_STRIP, color=NEUTRAL, linewidth=0, label="rigid")
     _finish_run_axes(figure, axes, *_label_run_axes(history), page=True)
     return figure
 

@@ -209,29 +209,34 @@ def draw_scan(
     roll.set(ylabel="|roll error| [degrees]", yscale="log")
     mean.set(ylabel="mean energy after td,\nrelative error", xlabel="tr [s]")
     for axes in (energy, roll, mean):
-        if reference.released is not None:
-            axes.axvspan(
-                0,
-                reference.released,
-                color=SWITCHED,
-                alpha=0.1,
-                linewidth=0,
-                label="the sled pushes",
-            )
-        if answer.recommended:
-            axes.axvline(
-                answer.recommended.tr,
-                color=GOOD,
-                linestyle="--",
-                linewidth=1,
-                label="recommended tr",
-            )
+        _mark_times_of_scan(axes, reference, answer)
         format_axes(axes)
     return figure
 
 
+def _mark_times_of_scan(axes: Axes, reference: Record, answer: PairSuggestion) -> None:
+    """Mark the time in which the sled pushes, and the recommended tr."""
+    if reference.released is not None:
+        axes.axvspan(
+            0,
+            reference.released,
+            color=SWITCHED,
+            alpha=0.1,
+            linewidth=0,
+            label="the sled pushes",
+        )
+    if answer.recommended:
+        axes.axvline(
+            answer.recommended.tr,
+            color=GOOD,
+            linestyle="--",
+            linewidth=1,
+            label="recommended tr",
+        )
+
+
 def draw_sled(axes: Axes, parameters: Parameters, position: float) -> None:
-    """Draw floor, curb and cushion of the sled at ``place`` [m], and the ground."""
+    """Draw floor, curb and cushion of the sled at ``position`` [m], and the ground."""
     p = parameters
     axes.axhline(-p.ground, color=REFERENCE, linewidth=1.2)
     if p.drop is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
-from d2rpick.report.fields import Field, get_kind, many, maybe, one_of, row
+from d2rpick.report.fields import Field, Kind, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
@@ -109,7 +109,11 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# All values of a candidate except its parts. In CSV the notes are the last column. Add a new measure at the end.
+# Keys of single parts, which are no longer compared. They keep their places for a version, without values.
+_NO_VALUE: Final = Kind({"type": "null"})
+NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
+                        "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
+# All values of a candidate. In CSV the notes are the last column. Add a new measure at the end.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -121,7 +125,12 @@ CANDIDATE: Final = row(
     Field("sign_match", "flag?"),
     Field("lock_in_error", "size?"),
     Field("residual", "size?"),
-    Field("part_mismatch", "size?"),
+    Field(
+        "part_mismatch",
+        _NO_VALUE,
+        "deprecated: always null, since parts are not compared one by one",
+        lambda _: None,
+    ),
     Field("rigid_time", get_kind("number", exclusiveMinimum=0)),
     Field("rigid_fraction", get_kind("number", exclusiveMinimum=0, maximum=1)),
     Field("timing_tolerance", "size?"),
@@ -184,13 +193,6 @@ LATER: Final = (
     "residual_high",
     *(field.key for field in _POSITION),
 )
-MATCHES: Final = Field("parts", many(row(
-    Field("name", "text"),
-    Field("sign_match", "flag?"),
-    Field("share", maybe(SHARE), "contribution of the part to the square of the part mismatch"),
-    Field("reason", "text?"),
-    name="part_match",
-)))  # fmt: skip
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
 # values of the decision on a pair
@@ -353,14 +355,13 @@ MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),
     Field("kinetic_share_estimated", "flag",
-          "true if kinetic_share comes from the modes of each part or from counted cycles, not from an oscillator",
+          "true if kinetic_share comes from the modes of the structure or from counted cycles, not from an oscillator",
           lambda now: now.vibration.estimated is not None),
     Field("basis", BASIS),
     Field("flight", FLIGHT, "free flight"),
     Field("oscillator", maybe(OSCILLATOR), get=_get_oscillator),
     Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
           "modes of basis modal, sorted by rate; null for other bases", _get_modes),
-    Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
-          "parts whose deformation has an unknown direction; null if the energies of parts are unknown",
-          lambda now: now.evidence.parts and now.evidence.parts.unsigned),
+    Field("unsigned_parts", _NO_VALUE,
+          "deprecated: always null, since parts are not compared one by one", lambda _: None),
 )  # fmt: skip

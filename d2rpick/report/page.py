@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from d2rpick.base.errors import Caution
     from d2rpick.choice.health import Health
-    from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.parts.cost import Weights
@@ -432,29 +431,6 @@ def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
     """Return the digests of the deck that an answer uses; nothing without a deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
-
-
-def build_mismatch_table(candidate: Candidate | None) -> Markup:
-    """Return a table of each part's contribution to the mismatch of a pair; nothing if the parts are unknown."""
-    if candidate is None or not candidate.parts:
-        return Markup()
-    sign = {True: "same", False: "opposite", None: "unknown"}
-    listed = [
-        (
-            part.name,
-            sign[part.sign_match],
-            "-" if part.share is None else f"{part.share:.0%}",
-            part.reason or "",
-        )
-        for part in candidate.parts
-    ]
-    title = "Parts at this pair"
-    return build_section(
-        title,
-        build_scrolling_table(
-            title, ("part", "sign", "share of the mismatch", "remark"), listed
-        ),
-    )
 
 
 def build_evidence(

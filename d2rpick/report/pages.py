@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.sets_of_parts import Parts, PartSet
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
-    from d2rpick.choice.td.trade_off import TradeOff
+    from d2rpick.choice.td.trade_off import Offer, TradeOff
     from d2rpick.histories.run import OpenedRun
     from d2rpick.histories.source import Source
     from d2rpick.running.drive import Driven
@@ -128,7 +128,6 @@ def _build_lower_sections(
     answer: PairSuggestion, record: page.PageContext
 ) -> Iterator[Markup]:
     yield build_section("Candidates", *_build_candidates(answer))
-    yield page.build_mismatch_table(answer.chosen)
     yield from page.build_evidence(answer.situation, answer.health, record)
     if answer.recommended and answer.decision:
         yield page.build_solver_input(
@@ -136,9 +135,9 @@ def _build_lower_sections(
         )
 
 
-def _build_choice(answer: PairSuggestion) -> Markup:
+def _build_choice(answer: PairSuggestion, title: str = "") -> Markup:
     """Return the section above the figures: the pairs of times in large type, and remarks."""
-    cards = [_build_recommendation(answer)]
+    cards = [_build_recommendation(answer, title)]
     better = answer.clearly_better
     if better:
         better_text = make_element("p", suggestion.describe_improvement(answer, better))
@@ -159,7 +158,7 @@ def _build_choice(answer: PairSuggestion) -> Markup:
     )
 
 
-def _build_recommendation(answer: PairSuggestion) -> Markup:
+def _build_recommendation(answer: PairSuggestion, title: str) -> Markup:
     best = answer.chosen
     decision = answer.decision
     if best is None or decision is None:
@@ -168,7 +167,11 @@ def _build_recommendation(answer: PairSuggestion) -> Markup:
         )
     times = best.tr, answer.td
     return page.build_verdict_card(
-        "", decision, times, answer.situation.history, suggestion.list_evidence(answer)
+        title,
+        decision,
+        times,
+        answer.situation.history,
+        suggestion.list_evidence(answer),
     )
 
 
@@ -202,7 +205,10 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
         answer.decision,
         times,
         situation.history,
-        verdict.list_pair_evidence(answer),
+        [
+            *map(verdict.list_comparison_verdict, filter(None, [answer.switched])),
+            *verdict.list_pair_evidence(answer),
+        ],
     )
     further_reasons = [
         reason for reason in answer.reasons if reason not in answer.decision.reason
@@ -215,7 +221,6 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
     yield build_section(
         "Measures", build_pairs((name, format_short(value)) for name, value in measures)
     )
-    yield page.build_mismatch_table(candidate)
     if answer.switched:
         yield _build_comparison(
             answer.switched, record.switched.files if record.switched else ()
@@ -259,17 +264,18 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         f"{len(answer.offers) - len(best)} more td in the csv and json results.",
         class_="soft",
     )
-    comparison = make_element(
-        "section",
-        build_pairs(trade_off.list_page_lines(answer)),
-        build_remarks(further),
-    )
-    front = [_build_choice(answer.suggestion), comparison]
     if answer.requested:
-        front.reverse()
+        front = [
+            page.build_front([_build_requested(answer, answer.requested)]),
+            _build_choice(answer.suggestion, "If td is free: "),
+        ]
+    else:
+        lines = build_pairs(trade_off.list_costs_of_other_offers(answer))
+        front = [_build_choice(answer.suggestion), make_element("section", lines)]
     return _write_run_page(
         record,
         *front,
+        make_element("section", build_remarks(further)),
         build_explorer(record.explorer),
         _draw_suggestion(answer.suggestion),
         _build_figure("explore-", caption, "trade_off", answer, page=True),
@@ -282,6 +288,22 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
             hidden,
         ),
         *_build_lower_sections(answer.suggestion, record),
+    )
+
+
+def _build_requested(answer: TradeOff, requested: Offer) -> Markup:
+    """Return the card of the best pair at the requested td, with the next better td."""
+    decision = answer.decide_on(requested)
+    if requested.best is None or decision is None:
+        return page.build_refusal(
+            f"No tr can be recommended for td = {requested.td:.6g}: {requested.answer.why_none}"
+        )
+    return page.build_verdict_card(
+        "Requested td: ",
+        decision,
+        (requested.best.tr, requested.td),
+        answer.situation.history,
+        [trade_off.list_other_td(answer, requested)],
     )
 
 
@@ -471,7 +493,7 @@ def parts_page(answer: Parts, command: Sequence[str]) -> str:
             build_section(name, build_scrolling_table(name, *cells))
             for name, cells in tables.items()
         ),
-        build_section("What to know", build_pairs(parts.list_remarks(answer))),
+        build_section("What to know", build_pairs(parts.list_page_remarks(answer))),
         build_section(
             "What was read",
             build_pairs(
@@ -497,13 +519,14 @@ def _build_set_card(best: PartSet | None) -> Markup:
         f"{best.saving:.0%}",
         make_element("i", " of the CPU time"),
     )
-    name = f"Parts {parts.format_part_ranges(best.parts)}: {parts.name_set(best)}"
+    name = f"Parts {parts.format_part_ranges(best.parts)}, {parts.name_set(best)}: "
     decision = best.decision
     if decision is None or best.window is None:
         why = Markup()
         title, class_ = name, "card chosen"
     else:
-        why = build_pairs(list_verdict_lines(decision, *best.window))
+        (_, times), *why_and_cure = list_verdict_lines(decision, *best.window)
+        why = build_pairs([("times", times), *why_and_cure])
         title = join([name, page.build_badge(decision)])
         class_ = f"card {page.CLASSES[decision.verdict]}"
     return make_element(

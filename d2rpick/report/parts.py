@@ -417,13 +417,16 @@ def name_set(part_set: PartSet) -> str:
 
 
 def list_remarks(answer: Parts) -> list[tuple[str, str]]:
+    """Return the meaning of the star and the remarks of a page, as (name, sentence) pairs."""
+    star = ("*", "the recommended set and its parts (d2rpick plan --part recommended)")
+    remarks = list_page_remarks(answer)
+    return [star, *remarks] if answer.recommended else remarks
+
+
+def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
     """Return remarks on the recommended set, and why other sets are not compared, as (name, sentence) pairs."""
     lines: list[tuple[str, str]] = []
     best = answer.recommended
-    if best:
-        lines.append(
-            ("*", "the recommended set and its parts (d2rpick plan --part recommended)")
-        )
     if best and best.step_growth is not None and best.step_growth > 1:
         if isinf(best.step_growth):
             much = "without limit"

@@ -69,7 +69,7 @@ def list_situation_heading(
     """Return the history and the basis of the choice, as (name, text) pairs; ``verbose`` adds reasons."""
     flight = situation.flight
     share = situation.kinetic_share
-    why = situation.vibration.reasons if verbose else None
+    why = situation.vibration.unknown if verbose else None
     kinetic = "" if share is None else f", kinetic fraction {format_measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     energy_unit = situation.history.energy_unit
@@ -109,13 +109,8 @@ def _describe_basis(situation: Situation) -> str:
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
-    summary = vibration.told
     if not (mode and fit):
-        if vibration.signed:
-            kinetic = "; kinetic energy from the modes of each part"
-        else:
-            kinetic = ""
-        return f"{summary}{kinetic}" if summary else _explain_level_alone(situation)
+        return vibration.told or _explain_level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
@@ -125,10 +120,7 @@ def _describe_basis(situation: Situation) -> str:
         else f"misfit {fit.misfit:.1e}"
     )
     source = "given" if situation.settings.oscillator else "identified"
-    front = f"{summary}; " if summary else ""
-    return (
-        f"{front}oscillator, {source}: {', '.join(facts)}; it refines tr and energies"
-    )
+    return f"oscillator, {source}: {', '.join(facts)}; it refines tr and energies"
 
 
 def _explain_level_alone(situation: Situation) -> str:

@@ -38,9 +38,7 @@ _WINDOW: Final = row(
 # a candidate and the decision on it
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
-    keys.MATCHES._replace(
-        get=lambda candidate_and_decision: candidate_and_decision[0].parts
-    ),
+    keys.NO_PARTS,
     *keys.DECIDED.of_part(
         lambda candidate_and_decision: candidate_and_decision[1],
         ("verdict", "verdict_reason", "cure"),

@@ -104,19 +104,12 @@ def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
     if trade_off.requested is None:
         return [
             *_list_verdict_of_chosen(trade_off),
-            *_list_costs_of_other_offers(trade_off),
+            *list_costs_of_other_offers(trade_off),
         ]
     return [
         *_list_verdict_of_requested(trade_off, trade_off.requested),
         *_list_choice_if_td_is_free(trade_off, trade_off.requested),
     ]
-
-
-def list_page_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return the lines of the answer that a page does not show as the card of the chosen pair."""
-    if trade_off.requested:
-        return list_answer_lines(trade_off)
-    return _list_costs_of_other_offers(trade_off)
 
 
 def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
@@ -143,7 +136,12 @@ def _list_verdict_of_requested(
         ]
     else:
         lines = list_verdict_lines(decision, requested.best.tr, requested.td)
-    return [*lines, ("other td", _describe_step(trade_off, requested))]
+    return [*lines, list_other_td(trade_off, requested)]
+
+
+def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
+    """Return what the next better td changes, after the name of the line."""
+    return ("other td", _describe_step(trade_off, requested))
 
 
 def _list_choice_if_td_is_free(
@@ -158,7 +156,7 @@ def _list_choice_if_td_is_free(
     ]
 
 
-def _list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
+def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
     """Return what a smaller error than that of the recommended pair costs, and what a longer rigid time costs."""
     best = trade_off.recommended
     if best is None:
@@ -189,15 +187,15 @@ def _describe_error_at(offer: Offer) -> str:
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts below."""
+    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts above them."""
     listed_offers = select_offers(trade_off, display.limit)
     offer_table = tables.select_known_columns(*build_offer_table(listed_offers))
     reasons = tables.format_as_list(list_offer_reasons(listed_offers))
     return "\n\n".join(
         [
             *tables.format_as_list(list_answer_lines(trade_off)),
-            tables.as_markdown(*offer_table),
             *reasons,
+            tables.as_markdown(*offer_table),
         ]
     )
 

@@ -57,7 +57,7 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
     *keys.MECHANICS.of_part(lambda answer: answer.situation),
     *MEASURES.fields,
     *keys.QUALITY,
-    keys.MATCHES._replace(get=lambda answer: answer.candidate.parts),
+    keys.NO_PARTS,
     keys.HEALTH,
     Field("reasons", "texts"),
     Field("switched", maybe(SWITCHED), "comparison of a finished switched run with the reference run; null without "
@@ -143,7 +143,6 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
         ("residual, expected", tables.format_if_known(best.residual, ".3f")),
         ("residual, lowest", tables.format_if_known(best.residual_low, ".3f")),
         ("residual, highest", tables.format_if_known(best.residual_high, ".3f")),
-        ("mismatch of the parts", tables.format_if_known(best.part_mismatch, ".3f")),
         ("timing tolerance", best.timing_tolerance),
         ("position error", best.position_error),
     ]

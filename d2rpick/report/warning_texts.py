@@ -63,9 +63,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Choose a td in a flight. If the evidence is wrong, give --after and --landing.",
         ),
         "rotation-unknown": Explanation(
-            "Neither the parts nor the motion of nodes shows how the body rotates in the flight. With the deck, the "
-            "margin before the next contact is the one for the worst rotation that the kinetic energy allows. Without "
-            "the deck, the margin may be too short.",
+            "Neither the parts nor the motion of nodes shows how the body rotates in the flight. If you give the "
+            "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
+            "contact may be large. Without the deck, the margin may be too short.",
             "Give the deck with --deck. In a Radioss run, also write the motion of at least three nodes of the body "
             "that do not lie on a line (/TH/NODE). For other solvers, set the margin with --margin.",
         ),
@@ -102,11 +102,6 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "A part that moves inside the body is frozen in the position that it has at tr. At td the body is "
             "displaced by the stated length, which is more than 1 % of its path. The next contact shifts.",
             "Leave the moving part deformable, choose another tr, or accept the displacement.",
-        ),
-        "part-without-sign": Explanation(
-            "The direction of the deformation of this part is unknown. d2rpick treats the energy of the part as "
-            "undetected, so the upper bound of the residual is higher.",
-            "Nothing to do if the part has little energy. Otherwise write the energies more often.",
         ),
         "partly-rigid": Explanation(
             "In the stated interval, some of the chosen parts were rigid and others were deformable. d2rpick does not "

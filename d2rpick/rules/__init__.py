@@ -42,9 +42,9 @@ _ALL = (
     for value in vars(module).values()
     if isinstance(value, Rule)
 )
-# prefix of the ids of the rules that need an energy history
+# Beginning of the ids of the rules that need an energy history.
 _BY_HISTORY: Final = "D2R2"
-# Smallest similarity (0 to 1) of a suggested rule id to the wrong id. It permits one additional character.
+# Smallest similarity (0 to 1) of a suggested rule id to the wrong id; it permits one additional character.
 _ALIKE: Final = 0.9
 # For each rule that reports a wrong unit: the rules that report only consequences of the same mistake.
 _FOLLOW: Final = {
@@ -52,7 +52,7 @@ _FOLLOW: Final = {
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# A time after the end of the run is also outside the history, so these rules report the same line again.
+# For each rule: other rules that already report the same field, such as a time after the end of the run.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
@@ -105,9 +105,7 @@ class Configuration(NamedTuple):
         return chosen and not (self.ignore and rule.startswith(self.ignore))
 
     def verify(self, rule_ids: Collection[str]) -> None:
-        """Raise ConfigurationError if the configuration names a rule that does not exist; the message names a
-        similar id.
-        """
+        """Raise ConfigurationError if the configuration names an unknown rule; the message names a similar rule."""
         where = f"{self.source}: " if self.source else ""
         for name in (*self.select, *self.ignore, *self.severity):
             exact = name in self.severity and name not in (*self.select, *self.ignore)
@@ -134,9 +132,7 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
 
 
 def _count_differences(first: str, second: str) -> int:
-    """Return the number of characters in which two strings of the same length differ; the longer length for other
-    strings.
-    """
+    """Return the number of different characters in two strings of equal length, else the longer length."""
     if len(first) != len(second):
         return max(len(first), len(second))
     return sum(a != b for a, b in zip(first, second, strict=True))
@@ -183,7 +179,7 @@ def read_configuration(
 def _read_rule_names(
     table: Mapping[str, object], key: str, source: str
 ) -> tuple[str, ...]:
-    """Return the rule ids listed under a key of the settings."""
+    """Return the rule ids that are listed under a key of the settings."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
@@ -193,7 +189,7 @@ def _read_rule_names(
 
 
 class CheckedWindow(NamedTuple):
-    """A rigid window; ``place`` is the card that opens it. It does not keep its deck in memory.
+    """A rigid window; ``place`` is the card that opens it. The deck is not kept in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     ``decision`` is the verdict on its pair of times; None if no history judges the pair.
@@ -213,8 +209,7 @@ class CheckedWindow(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """Result of the check of one deck; ``cards`` is the number of its switching cards, ``files`` are all files that
-    were read.
+    """Result of the check of one deck: the number of its switching ``cards``, and all ``files`` that were read.
 
     ``remarks`` report comments in the deck that silence no rule, ``notes`` report settings that are not used.
     """
@@ -232,7 +227,7 @@ class Checked(NamedTuple):
 def find_configuration(
     deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Return the configuration nearest to a deck, with the keys of ``override`` in place of its own.
+    """Return the configuration nearest to a deck; the keys of ``override`` replace its own keys.
 
     ``other_keys`` are keys that belong to other commands.
 
@@ -260,7 +255,7 @@ def check_deck(
     content: bytes | None = None,
     restarts: Sequence[str] = (),
 ) -> Checked:
-    """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
+    """Read a deck with its includes, or a Radioss run with its engine runs, and apply the rules.
 
     Parameters
     ----------
@@ -291,7 +286,7 @@ def check_deck(
     configuration.verify(RULES)
     case = _read_case(path, content, judge, restarts)
     findings = _remove_consequences(list(_apply_rules(case, configuration)))
-    order = {path: 0}  # the deck itself first, then its includes in order
+    order = {path: 0}  # The deck itself comes first, then its include files in order.
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(
@@ -316,7 +311,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Return the findings without those that follow from a wrong unit, or wrong time, reported by another rule."""
+    """Return the findings without consequences of a wrong unit or time that another rule reports."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {
@@ -396,13 +391,15 @@ def _read_case(
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe can be read only once
-        from d2rpick.deck.radioss_run import read_run  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_run import read_run
 
         run = read_run(path, content)
         return RunCase(run.deck, judge, run=run)
     deck = read_deck(path, source)
     if restarts:
-        from d2rpick.deck.restarts import join_restarts  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.restarts import join_restarts
 
         deck = join_restarts(deck, restarts)
     return Case(deck, judge)

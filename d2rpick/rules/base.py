@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-_BY_FORCE = {1, 2, 3, 4}  # values of CODE for switch sets that wait for a force
+_BY_FORCE = {1, 2, 3, 4}  # values of CODE of the switch sets that wait for a force
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -91,7 +91,7 @@ class Finding(NamedTuple):
 
 
 class Unreadable(NamedTuple):
-    """A deck that could not be checked, with the error; ``files`` are the files that nevertheless belong to it."""
+    """A deck that could not be checked, with the error; ``files`` are the known files of the deck."""
 
     deck: str
     error: Exception
@@ -112,7 +112,7 @@ class Unreadable(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Case:
-    """A deck as input of the rules; ``judge`` is set if an energy history is available to judge the windows."""
+    """A deck as input of the rules; ``judge`` is given if an energy history is available to judge the windows."""
 
     deck: Deck
     judge: HistoryJudge | None = None
@@ -124,12 +124,12 @@ class Case:
 
     @cached_property
     def parts(self) -> DeckParts:
-        """Return parts, part sets and rigid materials."""
+        """Return the parts, part sets and rigid materials of the deck."""
         return read_parts(self.deck)
 
     @cached_property
     def sets(self) -> tuple[SwitchSet, ...]:
-        """Return all switching cards."""
+        """Return all switching cards of the deck."""
         return read_switching(self.deck)
 
     @property
@@ -139,14 +139,14 @@ class Case:
 
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, SwitchHeader], ...]:
-        """Return the switching cards that have a header, with the header."""
+        """Return the switching cards that have header lines, each with its header."""
         return tuple(
             (card, card.header) for card in self.sets if card.header is not None
         )
 
     @cached_property
     def windows(self) -> Windows:
-        """Return the rigid windows of all parts, including switches by a force if the history shows them."""
+        """Return the rigid windows of all parts, including switches by a force if the history shows the force."""
         timed = find_windows(self.sets, self.parts)
         if self.sensed:
             by_sensor: list[tuple[float, SwitchEvent]] = []
@@ -192,9 +192,8 @@ class Case:
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
             return ()
-        from d2rpick.rules.by_force import (
-            follow_forced_switches,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.rules.by_force import follow_forced_switches
 
         end = min(self.judge.end, self.end or self.judge.end)
         return tuple(
@@ -208,7 +207,8 @@ class Case:
         """Return the switches by a force and by a sensor, with their windows."""
         if not self.sensed:
             return self.forced
-        from d2rpick.rules.by_force import Forced  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.rules.by_force import Forced
 
         switches = [*self.forced]
         for sensed_set in self.sensed:
@@ -227,9 +227,8 @@ class Case:
         """Return the CODE 5 sets with their sensor controls. Only controls that depend on a force need a history."""
         if not any(header.code.value == BY_SENSOR for _, header in self.headers):
             return ()
-        from d2rpick.rules.by_sensor import (
-            follow_sensed_switches,  # imported here to start faster
-        )
+        # Imported here to keep start-up fast.
+        from d2rpick.rules.by_sensor import follow_sensed_switches
 
         ends = (self.end, self.judge.end if self.judge else None)
         end = min((time for time in ends if time is not None), default=math.inf)
@@ -237,7 +236,7 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """Return the nodal rigid bodies, extra nodes and joints, which may belong to a switched part."""
+        """Return the nodal rigid bodies, extra nodes and joints of the deck, which may belong to a switched part."""
         return [
             *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
         ]
@@ -253,7 +252,7 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Return True if all parts are known; a file with only switching cards belongs to another deck."""
+        """Return True if all parts are known; a file that contains only switching cards belongs to another deck."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property
@@ -279,7 +278,7 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # empty because it applies to LS-DYNA decks only
+        ]  # The list is empty for Radioss, because only LS-DYNA decks scale ENDTIM.
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -289,7 +288,7 @@ class Case:
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the cards that do not switch by time, each with its trigger."""
+        """Return the cards that do not switch by time, each with the event that triggers it."""
         return ()
 
     @cached_property
@@ -308,17 +307,14 @@ class Case:
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Return the parts that must not be switched, with the reason, by part id."""
-        from d2rpick.deck.unswitchable import (
-            find_unswitchable_in_ls_dyna,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
         return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
     @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
-        """Return ENDTIM and the DT of the energy databases, with their cards: the rules compare switching times with
-        them.
-        """
+        """Return ENDTIM and the DT of the energy databases, each with its card."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
@@ -329,7 +325,7 @@ class Case:
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class RunCase(Case):
-    """A Radioss run as input of the rules: starter deck, legs (engine files), and the windows that they make."""
+    """A Radioss run as input of the rules: starter deck, engine files (``legs``), and the windows that they make."""
 
     run: RadiossRun
 
@@ -340,10 +336,9 @@ class RunCase(Case):
 
     @cached_property
     def found(self) -> RunWindows:
-        """Return the windows, and the parts of the rigid bodies."""
-        from d2rpick.deck.radioss_run import (
-            find_run_windows,
-        )  # imported here to start faster
+        """Return the rigid windows of the run, and the parts of its rigid bodies."""
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_run import find_run_windows
 
         if self.judge is None:
             return find_run_windows(self.run)
@@ -352,10 +347,9 @@ class RunCase(Case):
         )
 
     def _find_course(self, body: Body) -> Course:
-        """Return the switching times of a body whose sensor follows the run."""
-        from d2rpick.deck.radioss_run import (
-            find_course,
-        )  # imported here to start faster
+        """Return the data of the run that determine when the sensor of a body is active."""
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_run import find_course
 
         parts = self.found.parts.get(body.node.value, ())
         if self.judge is None:
@@ -374,7 +368,7 @@ class RunCase(Case):
 
     @cached_property
     def sets(self) -> tuple[SwitchSet, ...]:
-        """Return the cards that switch bodies."""
+        """Return the cards that switch rigid bodies."""
         return self.found.sets
 
     @cached_property
@@ -385,9 +379,8 @@ class RunCase(Case):
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
         """Return the bodies that a force sensor switches, with their switching times in the history."""
-        from d2rpick.deck.radioss_sensors import (
-            find_contacts_of_sensor,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_sensors import find_contacts_of_sensor
         from d2rpick.rules.by_force import Forced
 
         starter = self.run.starter
@@ -411,23 +404,20 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end time of the last leg as written."""
+        """Return the end time of the last engine run as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
     def switching(self) -> int:
-        """Return the number of switching cards: those in the legs, the bodies with a sensor, and the rigid
-        parts.
-        """
+        """Return the number of switching cards in engine runs, of bodies with a sensor, and of rigid parts."""
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
-        from d2rpick.deck.radioss_sensors import (
-            find_active_spans,  # imported here to start faster
-        )
+        """Return the bodies that a sensor switches at unknown times, and the engine runs that a sensor ends."""
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_sensors import find_active_spans
 
         starter = self.run.starter
         legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
@@ -458,9 +448,8 @@ class RunCase(Case):
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Return the parts that must not be switched, with the reason, by part id."""
-        from d2rpick.deck.unswitchable import (
-            find_unswitchable_in_radioss,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.unswitchable import find_unswitchable_in_radioss
 
         if self.run.starter:
             return find_unswitchable_in_radioss(self.run.starter)
@@ -468,18 +457,17 @@ class RunCase(Case):
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
-        """Return the harmful effects of starter cards on the nodes of the bodies that the legs switch."""
+        """Return the harmful effects of starter cards on the nodes of the bodies that the engine files switch."""
         if not self.run.named or not self.run.pushed:
             return ()
-        from d2rpick.deck.radioss_flaws import (
-            find_flaws,
-        )  # imported here to start faster
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.radioss_flaws import find_flaws
 
         return find_flaws(self.run, self.run.named)
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
-        """Return the indices of the legs in which a part or body is rigid, each with its windows."""
+        """Return the indices of the engine runs in which a part or body is rigid, each with its windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
 
-# For each CODE: what exerts the force, and True if the set waits for the force, False if it waits for its end.
+# For each CODE: what exerts the force, and True if the set waits for the force, False if for its end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,14 +34,14 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-_NEVER: Final = 1e20  # a TIME2 of at least this value sets no latest time
-# Windows below this fraction of the longest one are chatter, not flights.
+# smallest TIME2 that means that a set has no latest switching time
+_NEVER: Final = 1e20
+# Largest length of a window that is chatter and not a flight, as a fraction of the longest window.
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by a force, or a pair of them, with its windows in the history and the spans of the contact force
-    [time].
+    """A switch by a force, or a pair of them: its windows in the history, and the spans of the contact force [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
     time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
@@ -69,7 +69,7 @@ class Forced(NamedTuple):
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Return the windows that are not chatter; a window that stays open ends at infinity."""
+        """Return the windows that are not chatter; if a window has no end, its end is infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
@@ -184,7 +184,7 @@ def find_spans_of_force(
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)
     if entity is None:
-        # a file that contains only switching cards defines no contacts
+        # A file that contains only switching cards defines no contacts.
         alone = not entities.found and number > 0
         return judge.find_force_spans(kind, number, least) if alone else None
     name = entity.id or entity.number
@@ -208,9 +208,7 @@ def _has_one_force(deck: Deck) -> bool:
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
-    """Return the conditions of a switch set; None if it does not wait for a force, or one of its fields is
-    unreadable.
-    """
+    """Return the conditions of a switch set; None if it does not wait for a force, or has an unreadable field."""
     header = card.header
     factor = card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
@@ -251,5 +249,5 @@ def _find_pair(
 
 
 def _find_event(unit: Unit, events: Sequence[SwitchEvent]) -> SwitchEvent | None:
-    """Return the event that switches a unit, or None."""
+    """Return the event that switches a unit; None if there is no such event."""
     return next((event for event in events if event.unit == unit), None)

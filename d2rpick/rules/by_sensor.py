@@ -1,4 +1,4 @@
-"""Find when the *SENSOR_CONTROL of a switch set with CODE 5 switches, from the time and the forces in a history."""
+"""Find when the *SENSOR_CONTROL of a switch set with CODE 5 switches, using the time and forces in a history."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span
+    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
 
 
 class Sensed(NamedTuple):
-    """A switch set with CODE 5, and the times at which its sensor control changes (``changes``).
-    If these times are not known, ``unknown`` gives the reason.
-    """
+    """A switch set with CODE 5, and the ``changes`` of its sensor control; ``unknown`` says why they are unknown."""
 
     by: SwitchSet
     changes: tuple[Change, ...] = ()
@@ -32,9 +30,8 @@ class Sensed(NamedTuple):
     ) -> Iterator[tuple[float, SwitchEvent]]:
         """Yield the time and event of each switch; the parts are rigid while the control is on."""
         set_events = [event for event in events if event.by is self.by]
-        begins_off = (
-            self.changes[:1] == (Change(0.0, on=False),)
-        )  # a control that begins OFF finds the parts deformable, so its first OFF switches nothing
+        # A control that begins OFF finds the parts deformable, so its first OFF switches nothing.
+        begins_off = self.changes[:1] == (Change(0.0, on=False),)
         for change in self.changes[begins_off:]:
             for event in set_events:
                 to_rigid = event.line.to_rigid == change.on
@@ -48,9 +45,7 @@ def follow_sensed_switches(
     judge: HistoryJudge | None,
     end: float,
 ) -> Iterator[Sensed]:
-    """Yield the sets with CODE 5 of an LS-DYNA deck with their controls; without a history only the time is
-    evaluated.
-    """
+    """Yield the CODE 5 sets of an LS-DYNA deck with their controls; without a history only time is evaluated."""
     controls = {control.switch_set: control for control in read_controls(deck)}
 
     def find_spans(kind: str, number: int, least: float) -> Spans | None:

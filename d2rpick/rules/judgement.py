@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of the warnings of ``verify`` that the check passes on, because no rule reports them.
+# Codes of the warnings of ``verify`` that the check repeats, because no rule reports the same.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -95,9 +95,7 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def use_deck(self, deck: str) -> None:
-        """Use the supports, gravity and joints of this deck for the next judgements. A deck without parts defines
-        none.
-        """
+        """Use the supports, gravity and joints of this deck for the next judgements; without parts there are none."""
         try:
             inventory = read_inventory(deck)
         except DeckError:
@@ -115,7 +113,7 @@ class HistoryJudge:
 
     @property
     def cautions(self) -> list[Caution]:
-        """Return the warnings of all judgements so far."""
+        """Return the warnings of all judgements that were made so far."""
         return [
             caution._replace(message=f"{name_units(parts)}: {caution.message}")
             if parts
@@ -125,7 +123,7 @@ class HistoryJudge:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return notes of the readers on omissions and assumptions in all judgements so far."""
+        """Return what readers omitted or assumed in all judgements that were made so far."""
         return tuple(
             dict.fromkeys(
                 note
@@ -199,7 +197,7 @@ class HistoryJudge:
         return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """Return the time spans that `contacts` returns, with their uncertainty."""
+        """Return the time spans that `contacts` returns, and their uncertainty [time]."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if chosen:
             momenta = next(
@@ -217,7 +215,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Find when the force of a contact, interface or rigid wall acts [time]; None if no file contains the force.
+        """Return the spans in which a contact, interface or wall force acts [time]; None if no file has the force.
 
         ``least``: only a force above it counts [force].
         """
@@ -246,7 +244,7 @@ class HistoryJudge:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy have no locked-in energy (a note reports this). Only the flight limits the times.
+            # Parts without energy have no locked-in energy, which a note reports; only the flight limits their times.
             is_flight_known = verdict.situation.flight.start is not None
             return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
         for caution in verdict.cautions:
@@ -285,9 +283,7 @@ def _find_times_outside(
 
 
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
-    """Yield the objections that follow from a verdict. An inadmissible pair has at least one objection of severity
-    error.
-    """
+    """Yield the problems that follow from a verdict; an inadmissible pair has at least one error."""
     situation, decision = verdict.situation, verdict.decision
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
@@ -299,7 +295,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         yield Fault("D2R209", False, what)
     elif (
         _loses_most(situation)
-        # one mistake yields only one finding
+        # One mistake yields only one finding.
         and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
@@ -311,9 +307,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
 def _judge_open_window(
     history: History, tr: float, settings: Settings
 ) -> Iterator[Fault]:
-    """Yield an objection to a tr without td that lies neither in the last flight of the history nor in one around
-    tr.
-    """
+    """Object to a tr without td that lies neither in the last flight of the history nor in a flight around tr."""
     last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
@@ -392,7 +386,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Return the cure: a tr that suits this td, a better pair, or advice on where to look for a pair.
+    """Suggest a tr that suits this td, or a better pair, or say where to look for a pair.
 
     A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
     """
@@ -410,7 +404,7 @@ def _suggest_cure(verdict: PairVerdict) -> str:
 
 
 def _loses_most(situation: Situation) -> bool:
-    """Return True if more than half of the vibration energy is kinetic at td, and so lost for every tr."""
+    """Return True if more than half of the vibration energy is kinetic at td, so that it is lost for every tr."""
     share = situation.kinetic_share
     return share is not None and share > POOR_KINETIC_SHARE
 

@@ -453,13 +453,13 @@ def _describe_course(sensed: Sensed) -> str:
 
 
 def _describe_trigger(card: SwitchSet) -> str:
-    """Return the trigger of a switching card without a time; empty for a card with a time, or without effect."""
+    """Return the trigger of a switching card without a time; empty for other cards, and if it has no effect."""
     if card.restart:
         return ""
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
     if card.kind == "plain" and not card.switched and not card.count_problem:
-        # this card switches nothing itself: it only permits switches in a restart
+        # This card switches nothing itself, but permits switches in a restart.
         return ""
     if card.kind == "plain":
         return "acts at the start of the run"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # file name of an example deck that has no other name
+MAIN_DECK: Final = "main.k"  # file name of an example deck that is given no other name
 
 HEAD = """\
 *KEYWORD
@@ -47,7 +47,7 @@ WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 
 
 class Example(NamedTuple):
-    """An example deck with the files that it includes or that belong to its run; ``name`` is the file name of the deck.
+    """An example deck called ``name``, with the files that it includes or that belong to its run.
 
     ``history`` holds the arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the energy
     history for the check. ``options`` holds further arguments of ``d2rpick check``. If ``stdin`` is true, the deck is
@@ -64,7 +64,7 @@ class Example(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A rule of ``check``: its finding (``summary``), its importance (``explanation``) and the cure (``fix``).
+    """A rule of ``check``: what it finds (``summary``), why this matters (``explanation``), and the ``fix``.
 
     The ``passing`` and ``failing`` decks are both its documentation and its tests.
     """
@@ -74,14 +74,14 @@ class Rule(NamedTuple):
     summary: str
     explanation: str
     fix: str
-    # Function that finds the objections in a Case, or in a RunCase if the rule covers Radioss alone.
+    # Function that finds the problems in a Case, or in a RunCase if the rule covers Radioss alone.
     check: Callable[[Any], Iterable[Objection]]
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
     solvers: tuple[str, ...] = (LS_DYNA,)
 
 
-# Pieces of LS-DYNA decks and Radioss runs for the examples.
+# The code below makes pieces of LS-DYNA decks and Radioss runs for the examples.
 
 
 def write_automatic_card(
@@ -128,7 +128,7 @@ def make_deck(*cards: str) -> Example:
 
 
 def make_window(tr: str, td: str, more: str = "") -> Example:
-    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``. The cards in ``more`` follow."""
+    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``; the cards in ``more`` follow."""
     return make_deck(
         write_automatic_card(1, tr, rigid=["1"]),
         write_automatic_card(2, td, deformable=["1"]),
@@ -140,7 +140,7 @@ PASS = Example(GOOD)
 
 
 def write_starter_deck(group: str = GROUP, more: str = "") -> str:
-    """Return a starter deck with one part, which is a rigid body on a node group. The text ``more`` follows."""
+    """Return a starter deck with one part, which is a rigid body on a node group; the text ``more`` follows."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY}{group}{more}/END\n"
 
@@ -148,7 +148,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return the engine files of a run by file name. A leg is its end time and ON, OFF or nothing for /RBODY."""
+    """Return engine files by file name; an engine run is given by its end time and ON, OFF or nothing for /RBODY."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
@@ -187,10 +187,10 @@ def make_rule_decorator(
 
 
 def set_passing(*examples: Example) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the passing decks of a rule; the default is `GOOD`, or `GOOD_RUN` for Radioss."""
+    """Return a decorator that sets the decks that pass a rule; the default is `GOOD`, or `GOOD_RUN` for Radioss."""
     return lambda rule: rule._replace(passing=examples)
 
 
 def set_failing(*examples: Example) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the failing decks of a rule."""
+    """Return a decorator that sets the decks that fail a rule."""
     return lambda rule: rule._replace(failing=examples)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import RadiossLeg
     from d2rpick.deck.radioss_run import LeftRigid
 
-# Largest time step as a fraction of the rigid window, because the release is up to one time step late.
+# Largest time step as a fraction of the rigid window, because parts are released up to one time step late.
 _MOST_CAP = 0.01
 _MOST_LISTED = 8  # largest number of main nodes that a message lists
 
@@ -41,8 +41,8 @@ _KEEPS: Final = (
     write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
-)  # rigid body with Ikrem 1
-# Arguments of a matsum history in which only the third part deforms.
+)  # Starter deck with a rigid body that has Ikrem 1.
+# Arguments of `d2rpick replay` for a matsum history in which only the third part deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
@@ -59,9 +59,7 @@ _PLACES: Final = "/NODE\n" + "".join(
 
 
 def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
-    """Return a rigid wall at z = 0 that acts on the nodes of group ``added`` and on nodes within ``reach``.
-    It does not act on the nodes of group ``left_out``.
-    """
+    """Return a rigid wall at z = 0 that acts on nodes within ``reach`` and on group ``added``, not on ``left_out``."""
     text = (
         "/RWALL/PLANE/3\nground\n"
         + _write_row(0, 0, added, left_out)
@@ -82,7 +80,7 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
 
 
 def _make_run_with(*more: str) -> Example:
-    """Return a good run whose starter deck has these cards too."""
+    """Return a good run whose starter deck also contains these cards."""
     return make_run(_LEGS, write_starter_deck(more="".join(more)))
 
 
@@ -96,9 +94,7 @@ def _make_started_run(state: str, *nodes: int) -> Example:
 def _make_wheel_run(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
-    """Return a run with a wheel as a second rigid body; ``further_nodes`` are added to /RBODY/OFF of the first
-    engine file.
-    """
+    """Return a run with a wheel as second rigid body; its first /RBODY/OFF also lists ``further_nodes``."""
     mesh = f"/PART/{part}\nwheel\n{_write_row(1, 1)}/SHELL/{part}\n{_write_row(2, 5, 6, 7, 8)}"
     wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_write_row(*members)}"
     body = "/RBODY/2\nwheel\n" + _write_row(1809, 0, 0, 0, "", 0, 6)
@@ -112,7 +108,7 @@ def _make_wheel_run(
 
 
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
-    """Return the legs of a run if any of them switches a body. Other runs are not judged and yield no legs."""
+    """Return the engine runs (legs) if any of them switches a body; otherwise return no legs."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -352,9 +348,8 @@ def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
     """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    from d2rpick.deck.mesh import (
-        find_parts_with_elements,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.mesh import find_parts_with_elements
 
     parts = find_parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)
@@ -383,7 +378,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield the flaws in the run that have this code."""
+    """Yield the flaws of the run that have this code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
@@ -445,10 +440,9 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return the bodies that no leg switches, each with its deforming parts; None if the parts have no history."""
-    from d2rpick.deck.radioss_run import (
-        find_left_rigid,
-    )  # imported here to start faster
+    """Return the bodies that no engine run switches, with their deforming parts; None if these have no history."""
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.radioss_run import find_left_rigid
 
     left_bodies = find_left_rigid(case.run, case.windows.windows)
     return left_bodies, case.judge.deforming(

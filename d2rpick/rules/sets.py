@@ -44,7 +44,7 @@ _WALL: Final = (
     "0.0       0.0       0.0\n"
 )
 _CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
-# Arguments of the history of a box that lands on its edge and rattles.
+# Arguments of `d2rpick rollover` for the history of a box that lands on its edge and rattles.
 _LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
 
 
@@ -131,9 +131,8 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
         ):
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
-            first = (
-                header.swset.value < partner.swset.value
-            )  # a problem that concerns both sets is reported once, at one of them
+            # A problem that concerns both sets is reported once, at one of them.
+            first = header.swset.value < partner.swset.value
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
             elif first:
@@ -148,9 +147,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
 
 
 def _find_swapped(case: Case) -> Iterator[tuple[SwitchHeader, str]]:
-    """Yield the header of each set that makes parts rigid under a force, if another set makes them deformable
-    without one.
-    """
+    """Yield the header of each set that makes parts rigid under a force if another set releases them without it."""
     rigid_sets = [
         (card, header)
         for card, header in case.headers
@@ -184,7 +181,7 @@ def _find_units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
 
 
 def _describe_lone_problem(header: SwitchHeader) -> str:
-    """Return what is wrong with RELSW and PAIRED in one header; empty if nothing is wrong."""
+    """Describe what is wrong with RELSW and PAIRED in one header; empty if nothing is wrong."""
     relsw = header.relsw.value
     paired = header.paired.value
     if relsw and not paired:
@@ -195,7 +192,7 @@ def _describe_lone_problem(header: SwitchHeader) -> str:
 
 
 def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
-    """Return what is wrong with PAIRED or CODE in two sets that name each other; empty if nothing is wrong."""
+    """Describe what is wrong with PAIRED or CODE in two sets that name each other; empty if nothing is wrong."""
     ids = f"sets {first.swset.value} and {second.swset.value}"
     if first.paired.value == second.paired.value:
         return f"{ids} both have PAIRED {first.paired.value}"
@@ -331,7 +328,7 @@ def _check_entity_triggers(case: Case) -> Iterator[Objection]:
 
 
 def _list_entities(entities: Entities) -> str:
-    """Return a string that lists the contacts or walls, each with its id, keyword and title."""
+    """List the contacts or walls as text, each with its id, keyword and title."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found
@@ -453,9 +450,8 @@ def _check_entity_named(case: Case) -> Iterator[Objection]:
 
 def _make_landing_deck(wait: str) -> Example:
     """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
-    landed = _make_delayed_deck(wait).deck.replace(
-        "       0.2", "       0.7", 1
-    )  # the deck with this ENDTIM
+    # This deck has the ENDTIM of the history.
+    landed = _make_delayed_deck(wait).deck.replace("       0.2", "       0.7", 1)
     return Example(landed, history=_LANDING, computed_by="rollover")
 
 

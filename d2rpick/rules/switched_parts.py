@@ -78,15 +78,13 @@ _LAYERS, _BEAMS = (
 
 
 def _make_constrained_deck(text: str, flags: str = "         0         0") -> Example:
-    """Return a deck with a constraint on a node of part 1; ``flags`` holds NRBF and NCSF of the card that makes it
-    rigid.
-    """
+    """Return a deck with a constraint on a node of part 1; its card has ``flags``, the values of NRBF and NCSF."""
     rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
     return make_deck(_MESH + _SET + text + rigid_card + BACK)
 
 
 def _make_solid_deck(elform: str, tr: str = "0.02") -> Example:
-    """Return a deck whose part 1 is a solid with this ELFORM, made rigid at ``tr``."""
+    """Return a deck whose part 1 is a solid with this ELFORM; a card makes it rigid at ``tr``."""
     cards = write_automatic_card(1, tr, rigid=["1"]) + BACK
     return make_deck(f"*SECTION_SOLID\n         1{elform:>10s}\n" + cards)
 
@@ -108,7 +106,7 @@ def _group_by_card(
 
 
 def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
-    """Return True if a part set that cannot be resolved is switched: it may contain any part."""
+    """Return True if the deck switches a part set whose parts are unknown, because it may contain any part."""
     return any(
         event.unit.is_set and event.line.to_rigid == to_rigid
         for event in case.windows.events
@@ -243,8 +241,8 @@ def _check_ids_exist(case: Case) -> Iterator[Objection]:
 
 
 def _list_nearest(number: int, parts: DeckParts) -> str:
-    """Return the nearest part ids of the deck with their titles, as text in brackets."""
-    from heapq import nsmallest  # imported here to start faster
+    """Name the nearest part ids of the deck with their titles, as text in brackets."""
+    from heapq import nsmallest  # Imported here to keep start-up fast.
 
     near = sorted(
         nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))
@@ -314,9 +312,8 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import (
-        find_shared_nodes,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_shared_nodes
 
     for (low, high), node in find_shared_nodes(cards, bodies).items():
         if _is_rigid_together(case, first[low].unit, first[high].unit):
@@ -391,13 +388,12 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
 
 
 def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` that contains each node, by node id."""
+    """Return, by node id, the first of ``parts`` that contains the node."""
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
-    from d2rpick.deck.ls_dyna_inventory import (
-        find_first_parts,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_first_parts
 
     return find_first_parts(cards, parts)
 
@@ -433,7 +429,7 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 
 
 def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Return the flags of the first card that makes each part rigid without deleting constraints, by part id."""
+    """Return, by part id, the flags of the first card that makes the part rigid without deleting constraints."""
     first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
         flags = _find_flags(case, event.by)
@@ -601,9 +597,8 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     cards = find_element_cards(case.deck, searched=True) if joining else ()
     if not cards:
         return
-    from d2rpick.deck.ls_dyna_inventory import (
-        find_parts_of_nodes,
-    )  # imported here to start faster
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
 
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
     joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))

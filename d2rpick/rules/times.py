@@ -36,21 +36,21 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-# Number of output intervals in a rigid window from which crossings are found within 0.5 % of the window.
+# Smallest number of output intervals in a rigid window for which crossings are found within 0.5 % of it.
 _INTERVALS = 200
-# Rounding tolerance: relative amount by which an output interval may exceed its limit.
+# Relative amount by which an output interval may exceed its limit, because of rounding.
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # Up to this number of cards, D2R102 and D2R105 would report the same mistake.
+_FEW = 2  # largest number of cards with which D2R102 and D2R105 would report the same mistake
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
-_DECADES = 3.0  # powers of ten between two adjacent units of time
-# Tolerance for the end time of the history, as a power of ten: a reference run may end at half of the time.
+_DECADES = 3.0  # number of powers of ten between two adjacent units of time
+# Tolerance for the ratio of end times, as a power of ten; a reference run may end at half of the time.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
     "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -118,7 +118,7 @@ def _group_closed_windows(
 
 
 def _name_parts(windows: Sequence[SwitchWindow]) -> str:
-    """Return a string that lists the ids of the parts in some windows."""
+    """List the ids of the parts in some windows as text."""
     return name_units(window.unit.id for window in windows)
 
 
@@ -141,7 +141,7 @@ def _check_times_in_order(case: Case) -> Iterator[Objection]:
         together = (
             opening.kind == closing.kind == "restart"
             and opening.card.file == closing.card.file
-        )  # rule D2R117 reports cards with equal times
+        )  # Rule D2R117 reports cards with equal times.
         if (
             first.td is not None
             and first.td <= first.tr
@@ -274,7 +274,7 @@ def _check_equal_times(case: Case) -> Iterator[Objection]:
 
 
 def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | None:
-    """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000, else None.
+    """Return a message if the times fit a run up to ``end`` only if multiplied by 1000 or 1/1000, else None.
 
     ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
@@ -337,7 +337,7 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Yield the objections of one rule that follow from the energy history; parts of one card share an objection."""
+    """Yield the problems of one rule that the energy history shows; parts of one card share a problem."""
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window, judgement in case.judgements:
         for fault in judgement.faults:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError, RangeError, name_units
-from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.pieces import find_supports
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.radioss_sensors import list_forces
@@ -57,8 +56,7 @@ def check_driven(
     starter = read_run(path).starter
     if starter is None or not list_forces(starter):
         raise DeckError(f"{path}: {NO_CONTACT}")
-    not_springs = {part for part in parts if not {*inventory.counts[part]} <= DISCRETE}
-    _check_history(path, starter, not_springs)
+    _check_history(path, starter, {*parts} - inventory.springs)
     shortest = FEWEST * limits.interval
     if wait is not None and not shortest <= wait < limits.end / 2:
         raise RangeError(

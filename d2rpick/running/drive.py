@@ -16,7 +16,6 @@ from d2rpick.base.files import (
     parse_record,
     write_as_a_whole,
 )
-from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.looks import Looks
@@ -186,7 +185,7 @@ class Driver:
         )
 
     def _start_solver(self, program: str, number: int) -> None:
-        """Start the solver on the deck of a leg: the starter if ``leg`` is 0, else the engine."""
+        """Start the solver on the deck of a leg: the starter if its ``number`` is 0, else the engine."""
         deck = self.solver.file(number, ".rad").name
         self.solver.start(self.commands.words(program, deck), number)
 
@@ -300,9 +299,7 @@ class Observer:
         wait: float | None = None,
         of_deck: Wait | None = None,
     ) -> None:
-        springs = sorted(
-            part for part, kinds in inventory.counts.items() if {*kinds} <= DISCRETE
-        )
+        springs = sorted(inventory.springs)
         selection = Selection(
             parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
         )

@@ -20,7 +20,6 @@ from d2rpick.running.record import (
     GrowingColumn,
     GrowingRecord,
     RunningMaximum,
-    find_momenta,
 )
 from d2rpick.running.witness import GrowingWitness, Quiet
 
@@ -59,7 +58,6 @@ class GrowingEvidence:
         # For each state, True if the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
         self._largest_momentum = 0.0
-        # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
         self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
     @property
@@ -76,8 +74,8 @@ class GrowingEvidence:
         """Append states, which must have the same quantities as the states so far."""
         self._record.add(states)
         balance = states.balance
-        of_model = find_momenta(states, of_parts=False)
-        of_parts = find_momenta(states, of_parts=True)
+        of_model = states.find_momenta(of_parts=False)
+        of_parts = states.find_momenta(of_parts=True)
         self.moving = []
         if of_parts is not None and of_parts.time.size:
             self._add_parts(of_parts, of_model, balance)
@@ -177,12 +175,14 @@ class GrowingEvidence:
             return None
         if not witness.members:
             return 0.0
-        momenta = find_momenta(history, of_parts=witness.parts is not None)
+        momenta = history.find_momenta(of_parts=witness.parts is not None)
         assert momenta is not None
         times = witness.time[[0, first, last]]
         begin, start, end = np.searchsorted(momenta.time, times).tolist()
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
+        if so_far.change(witness.members) <= so_far.noise(witness.members):
+            return 0.0  # A fit would find the rounding errors of a constant momentum.
         laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(states.index(start), len(states) - 1)
 
@@ -218,7 +218,7 @@ class GrowingEvidence:
 
         The last of these periods may last to the end of the record.
         """
-        momenta = find_momenta(self.history, of_parts=True)
+        momenta = self.history.find_momenta(of_parts=True)
         if momenta is None:
             return []
         rigid_times = []

@@ -8,7 +8,7 @@ shorter wait treats such a gap as a flight, and a body frozen in it cannot rebou
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,14 +16,13 @@ from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import find_window
-from d2rpick.running.record import GrowingColumn, RunningMaximum, find_momenta
+from d2rpick.running.record import GrowingColumn, RunningMaximum
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
-    from d2rpick.running.evidence import GrowingEvidence
 
 # A change of velocity is an oscillation if it exceeds this share of the range so far.
 _SWING: Final = 1 / 3
@@ -165,6 +164,20 @@ class _Motion:
         )
 
 
+class Evidence(Protocol):
+    """What the inner motion needs of the evidence of a growing record."""
+
+    # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
+    moving: list[tuple[slice, tuple[int, ...]]]
+
+    @property
+    def history(self) -> History:
+        """All states so far."""
+
+    def free_since(self, time: float) -> float:
+        """Return when the force-free time that lasts up to a time began [time]."""
+
+
 class _Longest(NamedTuple):
     """The longest half period known ``since`` a time: its source, and its end ``over`` [time].
 
@@ -188,7 +201,7 @@ class InnerMotion:
 
     def __init__(
         self,
-        evidence: GrowingEvidence,
+        evidence: Evidence,
         given: float | None = None,
         of_deck: Wait | None = None,
         before: float = 0.0,
@@ -212,7 +225,7 @@ class InnerMotion:
 
     def take(self, states: History) -> None:
         """Append states that the evidence already contains."""
-        momenta = find_momenta(states, of_parts=True)
+        momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses)
             for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):

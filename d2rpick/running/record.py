@@ -97,12 +97,8 @@ class GrowingRecord:
 
 
 def _list_tables(history: History) -> list[Table]:
-    """Return the history itself, each of its momenta, and its balance if there is one.
-
-    The energies of single parts, many numbers that are not needed here, are left out.
-    """
-    tables: list[Table] = [replace(history, part_energies=None, part_names=())]
-    tables += history.momenta
+    """Return the history itself, each of its momenta, and its balance if there is one."""
+    tables: list[Table] = [history, *history.momenta]
     if history.balance:
         tables.append(history.balance)
     return tables
@@ -174,11 +170,3 @@ def _contains(table: Table, state: int, last_state: Table) -> bool:
         if not np.allclose(value, last_value, rtol=0, atol=tolerance, equal_nan=True):
             return False
     return True
-
-
-def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
-    """Return the momenta of the parts, or of the whole model; None if they are not written."""
-    for momenta in history.momenta:
-        if (momenta.parts is not None) is of_parts:
-            return momenta
-    return None

@@ -13,7 +13,6 @@ from d2rpick.flight.position_error import (
     integrate_displacements,
 )
 from d2rpick.histories.samples import find_window
-from d2rpick.running.record import find_momenta
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta
@@ -49,7 +48,7 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
     td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
     if the part momenta are not sufficient.
     """
-    momenta = find_momenta(history, of_parts=True)
+    momenta = history.find_momenta(of_parts=True)
     if momenta is None or momenta.parts is None:
         return None
     moving_parts = tuple(momenta.parts[number] for number in momenta.moving)

@@ -39,7 +39,7 @@ _NO_EVIDENCE: Final = (
 )
 
 
-class Stamp(NamedTuple):
+class WatchedFile(NamedTuple):
     """What changes when a file is written: its number, its size, and the time at which it was ``written`` [s]."""
 
     number: int
@@ -66,7 +66,7 @@ class Watch:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self._looks = Looks(*self._of_looks)
         self._begin_again()
-        self._files: dict[str, Stamp] = {}
+        self._files: dict[str, WatchedFile] = {}
         self._events: tuple[Event, ...] = ()  # events reported so far
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
@@ -207,7 +207,7 @@ def follow(
         rest(min(pause, remaining))
 
 
-def find_files(names: Sequence[str]) -> dict[str, Stamp]:
+def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
     """Return the non-empty files of a run, including those of later legs in the same folder, with their stamps."""
     try:
         paths = expand(names)
@@ -220,5 +220,7 @@ def find_files(names: Sequence[str]) -> dict[str, Stamp]:
         with suppress(OSError):  # The file may not exist yet, or no longer.
             status = Path(path).stat()
             if status.st_size:
-                files[path] = Stamp(status.st_ino, status.st_size, status.st_mtime)
+                files[path] = WatchedFile(
+                    status.st_ino, status.st_size, status.st_mtime
+                )
     return files

@@ -1,21 +1,24 @@
 """Identify the vibration: find the models that describe it, best first.
 
 Every measure of a pair (tr, td) needs the deformations at both times and their relative direction (`measures`).  The
-energy does not show the sign of a deformation, so a model must.  `find_part_signs`, `span` and `find_models` look for
-them in this order, and `model.model_at` decides which one can be relied on at a td:
+energy does not show the sign of a deformation, so a model must.  `span` and `find_models` look for one in this order,
+and `model.model_at` decides which one can be relied on at a td:
 
-1. parts (`part_signs`, `waves`): the deformation of each part with its sign, from the zeros of its own energy,
-   confirmed by a few damped waves; E = q^2 for each part.
-2. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
+1. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
    + b sin omega t), the published floating oscillator (`oscillator`), fitted by least squares in the longest window
    around td in which it describes the record.  Systematic structure in the rest refuses it.
-3. modal (`lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`): any number of modes.  The energy halfway
+2. modal (`lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`): any number of modes.  The energy halfway
    between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2, and with it
    R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or widen
    the band of R.
-4. swings (`swings`): the energy comes down to its floor in each swing; each minimum is a zero of the deformation,
+3. swings (`swings`): the energy comes down to its floor in each swing; each minimum is a zero of the deformation,
    whatever the law of the spring.
-5. energy: no sign is known; times at which the energy has the level of td remain (`moments`).
+4. energy: no sign is known; times at which the energy has the level of td remain (`moments`).
+
+The modal model describes nearly every record.  The others stay because each is better somewhere (figures:
+docs/explanation/basis.md): the oscillator states R of one mode ten times as accurately, and can be given; counted
+swings know the direction for springs that stiffen and for friction, where lines are refused or wide.  Energies of
+several parts are added, since only their sum is the energy of a whole structure.
 
 Lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy, or replace them where plastic
 flow or a damper's work hides these.
@@ -37,12 +40,11 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.modal import ModalVibration
-    from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
 # Names of the models, best first.
-MODELS: Final = ("parts", "oscillator", "modal", "swings", "energy")
+MODELS: Final = ("oscillator", "modal", "swings", "energy")
 
 
 class VibratingTogether(Protocol):
@@ -58,30 +60,7 @@ class VibratingTogether(Protocol):
 
 
 if TYPE_CHECKING:
-    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-
-
-def find_part_signs(history: History, around: Span) -> dict[str, SignedModel]:
-    """Find the signs of single parts in a window around td if their energies are written; return them by name."""
-    from d2rpick.histories.samples import get_ends
-
-    time = history.between(*around)[0]
-    if history.part_energies is None or time.size < 3:
-        return {}
-    return {"parts": _read_part_signs(history, *get_ends(time))}
-
-
-@remember
-def _read_part_signs(history: History, first: float, last: float) -> SignedParts:
-    """Find the signs of single parts from their energies between the states at two times."""
-    from d2rpick.histories.samples import find_window
-    from d2rpick.vibration.part_signs import SignedParts
-
-    assert history.part_energies is not None
-    inside = find_window(history.time, first, last)
-    return SignedParts(
-        history.time[inside], history.part_energies[inside], history.part_names
-    )
+    SignedModel: TypeAlias = ModalVibration | Swings
 
 
 def find_models(

@@ -1,4 +1,4 @@
-"""Compute all quantities that follow from the signed amplitudes of modes or parts."""
+"""Compute all quantities that follow from the signed amplitudes of modes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 class SignedAmplitudes:
-    """A deformation that is given by the signed ``amplitudes`` of its modes or parts."""
+    """A deformation that is given by the signed ``amplitudes`` of its modes."""
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return signed deformations, with the shape of ``t`` and a first axis for modes or parts [sqrt(energy)]."""
+        """Return signed deformations, with the shape of ``t`` and a first axis for modes [sqrt(energy)]."""
         raise NotImplementedError
 
     def elastic_energy(self, t: Samples | float) -> Samples:
@@ -32,5 +32,5 @@ class SignedAmplitudes:
         return np.asarray(np.sum(self.differences(tr, td) ** 2, axis=0))
 
     def differences(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return q(tr) - q(td), with the shape of ``tr`` and a first axis for modes or parts [sqrt(energy)]."""
+        """Return q(tr) - q(td), with the shape of ``tr`` and a first axis for modes [sqrt(energy)]."""
         return np.asarray((self.amplitudes(tr).T - self.amplitudes(td).T).T)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
     # Measures of n times: arrays of shape (n,) by name, NaN for unknown values.
@@ -68,7 +67,6 @@ class Measured(Record):
     residual_low: float | None = None
     residual_high: float | None = None
     timing_tolerance: float | None = None
-    part_mismatch: float | None = None
 
 
 def measured(
@@ -77,13 +75,8 @@ def measured(
     td: Samples | float,
     tolerance: Samples,
     band: Band,
-    *,
-    of_parts: bool,
 ) -> Columns:
-    """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr.
-
-    If ``of_parts`` is True the deformations are those of parts, and the mismatch is relative to their energy at td.
-    """
+    """Compute a column for each field of `Measured` from times tr (n,) and one ``td``, or a td for each tr."""
     lock_in = lock_in_error(vibration, tr, td)
     error, lowest, highest = band(
         residual(lock_in, kinetic_share(vibration, td)), tr, td
@@ -95,9 +88,6 @@ def measured(
         "residual_low": lowest,
         "residual_high": highest,
         "timing_tolerance": tolerance,
-        "part_mismatch": part_mismatch(vibration, tr, td)
-        if of_parts
-        else np.full(tr.shape, np.nan),
     }
 
 
@@ -153,7 +143,7 @@ def lock_in_error(
     """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the locked-in deformation, in the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
-    several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
+    several modes the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
     tr, or one for each.
     """
     return np.asarray(
@@ -161,29 +151,13 @@ def lock_in_error(
     )
 
 
-def part_mismatch(
-    vibration: Deformation, tr: Samples | float, td: Samples | float
-) -> Samples:
-    """Return D = L/sqrt(1 - K) [-]: the same error relative to the internal energy at td, shape of ``tr``."""
-    return np.asarray(
-        np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.elastic_energy(td))
-    )
-
-
-def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Samples:
-    """Return the share of each mode or part in D^2, shape (k,) [-]; zero if there is no mismatch."""
-    square = vibration.differences(tr, td) ** 2
-    total = square.sum()
-    return square / total if total > 0 else square
-
-
 def sign_match(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> NDArray[np.bool_]:
     """Return for each tr whether the deformations at tr and td have the same direction.
 
-    For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part with
-    almost no deformation does not decide.
+    For one mode: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a mode with almost no
+    deformation does not decide.
     """
     return np.asarray(vibration.overlap(tr, td) >= 0)
 

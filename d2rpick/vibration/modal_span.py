@@ -82,25 +82,6 @@ def get_inner_window(history: History, guess: Span) -> Span:
     return Span(float(start), float(end))
 
 
-def get_outer_window(history: History, guess: Span) -> Span:
-    """Return the whole parts of a record that contain a guessed window, so that guesses of many td share few windows.
-
-    Examples
-    --------
-    >>> from d2rpick.histories.history import History
-    >>> time = np.linspace(0.0, 16.0, 33)
-    >>> history = History(time, time, source=("made",), format="csv", channel="E")
-    >>> get_outer_window(history, Span(2.3, 7.9)), get_outer_window(history, Span(0.0, 15.1))
-    (Span(start=2.0, end=8.0), Span(start=0.0, end=16.0))
-    """
-    first = history.start
-    last = history.end
-    part = (last - first) / _PARTS
-    start = first + part * np.floor((guess.start - first) / part)
-    end = first + part * np.ceil((guess.end - first) / part)
-    return Span(max(float(start), first), min(float(end), last))
-
-
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
     """Yield windows to try: the guessed one, then later ones up to the end of the record."""
     if guess is not None:

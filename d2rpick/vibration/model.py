@@ -1,9 +1,8 @@
 """Decide which model of the vibration is reliable at a td, and describe the vibration by it.
 
-The order is that of `MODELS`: the signs of parts before an oscillator that describes the record, this before the modes
-of the structure and counted swings unless it leaves much over, and these before the energy alone.  The result is a
-`Vibration`: the energy of the whole around td, and the deformations that can be compared with those at td, if any are
-known.
+The order is that of `MODELS`: an oscillator that describes the record before the modes of the structure and counted
+swings unless it leaves much over, and these before the energy alone.  The result is a `Vibration`: the energy around
+td, and the deformations that can be compared with those at td, if any are known.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
@@ -43,7 +41,6 @@ if TYPE_CHECKING:
     from d2rpick.vibration import SignedModel
     from d2rpick.vibration.measures import Band, Columns, Deformation, Profile
     from d2rpick.vibration.modal import ModalVibration
-    from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
 # The reason given if the vibration at td is below the noise, so that no tr can be trusted.
@@ -56,8 +53,6 @@ NEAR_TD: Final = 0.25
 # How far a match may be from the true minimum, in intervals of the profile.  With modes, known between states as well,
 # 93 % of 2200 vertices of parabolas were within an eighth, and the others where the error hardly changes.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
-# Largest number of parts that a warning names for one reason. The JSON output names all parts.
-_NAMED = 5
 
 
 class Compared(NamedTuple):
@@ -94,8 +89,6 @@ class Vibration:
         What the kinetic share is an estimate from, and why; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
-    parts : SignedParts or None
-        The signs of single parts, even if they are not used.
     """
 
     basis: str
@@ -106,7 +99,6 @@ class Vibration:
     told: str = ""
     estimated: str | None = None
     doubts: tuple[str, ...] = ()
-    parts: SignedParts | None = None
 
     @property
     def td(self) -> float:
@@ -114,32 +106,11 @@ class Vibration:
         return self.whole.td
 
     @property
-    def signed(self) -> SignedParts | None:
-        """Return the parts whose signs are used; None if no signs are used."""
-        return self.parts if self.basis == "parts" else None
-
-    @property
     def modal(self) -> ModalVibration | None:
         """Return the modes of the structure that are used; None if none are used."""
         if self.basis == "modal" and self.compared:
             return cast("ModalVibration", self.compared.deformation)
         return None
-
-    @property
-    def reasons(self) -> str | None:
-        """Return the reasons why no signed deformation is known, also for single parts; None if one is known."""
-        if self.compared or not self.parts:
-            return self.unknown
-        names: dict[
-            str | None, list[str]
-        ] = {}  # grouped by reason, since the parts of a structure often have the same
-        for part in self.parts.unsigned:
-            names.setdefault(part.reason, []).append(part.name)
-        of_parts = (
-            f"{list_names(alike, most=_NAMED)}: {reason}"
-            for reason, alike in names.items()
-        )
-        return "; ".join((self.unknown or "", *of_parts))
 
     @property
     def kinetic_share(self) -> float | None:
@@ -266,16 +237,6 @@ class Vibration:
             moments.are("match"), self.profile.cell(moments.tr) * share, reach
         )
 
-    def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
-        """Return the contribution of each part to the mismatch; empty if single parts are unknown."""
-        if self.signed is None:
-            return ()
-        from d2rpick.vibration.part_signs import (
-            list_contributions,
-        )  # Imported here to keep start-up fast.
-
-        return list_contributions(self.signed, tr, self.td)
-
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
         """Return for each time whether its deformation can be compared with the deformation at td."""
         if self.compared is None:
@@ -293,10 +254,7 @@ class Vibration:
             tolerance = self.profile.tolerances(
                 tr, measures.lock_in_error(deformation, tr, td)
             )
-        of_parts = self.basis == "parts"
-        return measures.measured(
-            deformation, tr, td, tolerance, self.compared.band, of_parts=of_parts
-        )
+        return measures.measured(deformation, tr, td, tolerance, self.compared.band)
 
 
 def find_moments(
@@ -396,11 +354,6 @@ class Evidence(NamedTuple):
     models: Mapping[str, SignedModel] = {}
 
     @property
-    def parts(self) -> SignedParts | None:
-        """Return the deformations of single parts, even if too few of them have a sign."""
-        return cast("SignedParts | None", self.models.get("parts"))
-
-    @property
     def signed(self) -> str | None:
         """Return the name of the model that gives the sign; None if none does."""
         return next((name for name, model in self.models.items() if model.signed), None)
@@ -444,23 +397,13 @@ class Evidence(NamedTuple):
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Return the best reliable model; ``whole`` is the model of the total energy."""
-    return replace(_choose_best(whole, evidence), parts=evidence.parts)
-
-
-def _choose_best(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Choose the best reliable model."""
+    """Return the best reliable model; ``whole`` is the oscillator or, without one, the samples of the energy."""
     if not evidence.signed:
         return whole
     basis = evidence.signed
     model = evidence.models[evidence.signed]
     td = whole.td
-    names = [*MODELS]
     modes = whole.whole
-    if names.index(basis) < names.index("oscillator"):
-        if whole.compared or model.known_at(td):
-            return _compare_with_signs(whole, basis, model)
-        return _note_sunk(whole)
     if whole.doubts or not is_doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, OscillatorEnergy):
@@ -492,16 +435,6 @@ def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vib
         estimated=f"{model.kinetic}: {whole.unknown}"
         if whole.unknown and model.kinetic
         else None,
-    )
-
-
-def _note_sunk(whole: Vibration) -> Vibration:
-    """Add the note that the vibration of the parts at td is below the error of the solver."""
-    unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
-    return replace(
-        whole,
-        unknown=unknown,
-        doubts=(SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)),
     )
 
 

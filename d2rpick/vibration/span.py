@@ -22,24 +22,10 @@ from d2rpick.vibration.modes import BLOCK, Mode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from typing import Protocol
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
-
-    class Damped(Protocol):
-        """Interface of what is fitted to an energy: a mode, or waves with a common deformation."""
-
-        @property
-        def alpha(self) -> float:
-            """Return the damping [1/time]."""
-
-        def energy(self, t: Samples | float) -> Samples:
-            """Return the internal energy E [energy]."""
-
-        def vibration_energy(self, t: Samples | float) -> Samples:
-            """Return the vibration energy V [energy]."""
 
 
 # Trial windows begin at the shares _BEGINNINGS of the time before td and end at the shares _ENDS of the time after td.
@@ -481,7 +467,7 @@ def _clear_ends(
     return _find_reach(history, bounds, middle, core) or span, core
 
 
-def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
+def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     """Return the share of the vibration energy that a further mode, hidden in the misfit, may have [-].
 
     That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
@@ -490,16 +476,16 @@ def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> floa
     ----------
     time, energy : array of shape (n,)
         The window that was fitted [time], [energy].
-    model : Damped
+    mode : Mode
         The fit.
     """
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
     s = (time - time[0]) / span
     remainder = average_cells(
-        s, integrate_by_trapezia(s, energy - model.energy(time)), count
+        s, integrate_by_trapezia(s, energy - mode.energy(time)), count
     )
-    decay = np.exp(-model.alpha * span * (np.arange(count) + 0.5) / count)
+    decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
     # The range is from one period in the record to the fastest line that the cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     strongest = float(
@@ -507,7 +493,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, model: Damped) -> floa
     )
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # The energy of a mode oscillates about its mean by half of the vibration energy.
-    return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
+    return min(2 * amplitude / float(mode.vibration_energy(time[0])), 1.0)
 
 
 def measure_deviations(

@@ -269,16 +269,6 @@ ROWS = (
         most=3.0,
     ),
     Row(
-        "narrow window / --td, signs of two parts",
-        choosing("window_to_td", "parts", "narrow"),
-        most=3.0,
-    ),
-    Row(
-        "wide window / --td, signs of two parts",
-        choosing("window_to_td", "parts", "wide"),
-        most=3.0,
-    ),
-    Row(
         "explore / --td, noise, 1e5 states",
         choosing("explore_to_td", "noisy", "0.9", "--after", "0.1"),
         most=10.0,

@@ -98,16 +98,8 @@ def drowned_growth() -> float:
 
 
 def window_to_td(kind: str, width: str, *options: str) -> float:
-    """Return the cost of `--td-window` over that of `--td` for 1e5 states; ``kind`` is "noisy", "clean" or "parts"."""
-    file = str(
-        {"noisy": _make_noisy_energy, "clean": _clean, "parts": _make_two_parts}[kind](
-            100_000
-        )
-    )
-    if kind == "parts":
-        options = (*options, "--energy", "IE_left", "--energy", "IE_right")
-        document = json.loads(read_output(*_suggest(file, *options, "-f", "json")))
-        assert document["basis"] == "parts"
+    """Return the cost of `--td-window` over that of `--td` for 1e5 states; ``kind`` is "noisy" or "clean"."""
+    file = str({"noisy": _make_noisy_energy, "clean": _clean}[kind](100_000))
     return _compare_processes(
         _suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options)
     )
@@ -418,24 +410,6 @@ def _clean(states: int) -> Path:
     """Write the energy of the paper's oscillator."""
     time = np.linspace(0.0, 1.0, states)
     return _write_record(f"clean{states}.csv", time, MODE.energy(0.15 * time))
-
-
-def _make_two_parts(states: int) -> Path:
-    """Write the energies of two parts with one mode each; several modes and noise would hide the signs."""
-    time = np.linspace(0.0, 1.0, states)
-    swing = [
-        size * np.sin(2 * np.pi * cycles * time)
-        for size, cycles in ((1.0, 8.0), (0.7, 13.7))
-    ]
-    energies = np.exp(-1.6 * time) * np.square(swing)
-    energies += (
-        _NOISE
-        * energies.max()
-        * np.random.default_rng(14).standard_normal(energies.shape)
-    )
-    return _write_record(
-        f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right")
-    )
 
 
 def _write_record(

@@ -184,12 +184,10 @@ def draw_records(kind: str, seed: int, number: int) -> Iterator[PartsRecord]:
 
 
 def make_history_of_parts(time: Samples, energies: Samples) -> History:
-    """Return the history of parts with these energies, shape (n, k), as a reader gives it."""
-    names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
+    """Return the history of the sum of the energies of parts, shape (n, k), as a reader gives it."""
     return History(
-        time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
-        part_energies=energies,
-    )  # fmt: skip
+        time, energies.sum(axis=1), source=("made",), format="csv", channel="sum"
+    )
 
 
 def recommend_pair(record: PartsRecord) -> Pair | None:

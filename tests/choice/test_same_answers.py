@@ -380,18 +380,18 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
     (
         "chain", 0.13505, {},
         FrozenAnswer(
-            basis="parts", recommended=RoundedPair(tr=0.0808313, td=0.13505, residual=0.065), tr_half_width=9.9e-05,
-            better_pair=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066),
-            candidates=24, admissible=4, next_tr=(0.0790052, 0.134987, 0.135004),
+            basis="modal", recommended=RoundedPair(tr=0.0807725, td=0.13505, residual=0.08), tr_half_width=0.00011,
+            better_pair=RoundedPair(tr=0.0807735, td=0.135004, residual=0.08),
+            candidates=4, admissible=3, next_tr=(0.0457268, 0.0260327, 0.101451),
             windows=(),
         ),
     ),
     (
         "chain", (0.1, 0.2), {},
         FrozenAnswer(
-            basis="parts", recommended=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066), tr_half_width=9.9e-05,
-            better_pair=RoundedPair(tr=0.0808327, td=0.135004, residual=0.066),
-            candidates=22, admissible=2, next_tr=(0.0790052, 0.0457062, 0.0260541),
+            basis="modal", recommended=RoundedPair(tr=0.0807724, td=0.135054, residual=0.08), tr_half_width=0.00011,
+            better_pair=RoundedPair(tr=0.0807735, td=0.135004, residual=0.08),
+            candidates=4, admissible=3, next_tr=(0.0457269, 0.0260327, 0.101451),
             windows=(),
         ),
     ),

@@ -143,7 +143,7 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("energies", "basis"),
-    [(("IE_spring1_J", "IE_spring2_J"), "parts"), (("IE_spring1_J",), "swings")],
+    [(("IE_spring1_J", "IE_spring2_J"), "modal"), (("IE_spring1_J",), "swings")],
 )
 @pytest.mark.parametrize(("td", "is_kept"), [(0.208, True), (0.238, False)])
 def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(

@@ -486,7 +486,7 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
     assert modes.situation.basis == "modal"
     check(modes, 1)
     parts = suggest_in_history(chain.read_chain_history(), td, Settings())
-    assert parts.situation.basis == "parts"
+    assert parts.situation.basis == "modal"
     check(parts, 1)
     assert len(find_windows_of(parts))
 

@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+import d2rpick as d2
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.question import Settings
-from d2rpick.models.box_run import make_history
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import make_history, simulate
+from d2rpick.report.history_files import BOX_WRITERS
 from tests.energies import require
 from tests.faults import choose_some
 from tests.rehearsals import SETS, rehearse
@@ -34,3 +37,16 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
     released = require(rehearsal.reference.released)
     assert min(pair.tr, require(rehearsal.tr)) >= released - INTERVAL
+
+
+def test_a_run_and_its_matsum_have_one_answer(tmp_path: Path) -> None:
+    """The step vibrates together with the box; both answers have to know it."""
+    record = simulate(Parameters(mesh=MESH), 0.42, interval=INTERVAL)
+    matsum = tmp_path / "matsum"
+    matsum.write_bytes(BOX_WRITERS["matsum"](record))
+    of_file = d2.suggest(d2.read(str(matsum)), td=0.35, parts="box")
+    of_record = suggest_in_history(make_history(record), 0.35, Settings())
+    assert of_file.basis == of_record.situation.basis
+    assert require(of_record.recommended).tr == pytest.approx(
+        require(of_file.recommended).tr, abs=INTERVAL
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tests.pictures import decisions, mechanics, screenshots, tutorial
+from tests.pictures import decisions, mechanics, samples, screenshots, tutorial
 from tests.pictures.drawing import write_figure
 
 PICTURES = {
@@ -32,6 +32,8 @@ def write_pictures(names: list[str]) -> None:
     for name in names:
         if name in PICTURES:
             write_figure(PICTURES[name](), name)
+        elif name in samples.NAMES:
+            samples.draw_sample(name)
         elif program := screenshots.browser():
             screenshots.take_screenshot(name, program)
         else:
@@ -39,4 +41,4 @@ def write_pictures(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    write_pictures(sys.argv[1:] or [*PICTURES, *screenshots.NAMES])
+    write_pictures(sys.argv[1:] or [*PICTURES, *samples.NAMES, *screenshots.NAMES])

@@ -21,7 +21,7 @@ _PAGES: Final = {
     ),
     "page-explore": (
         ("explore", "--td", "0.064", "--td-window", "0.05", "0.08", _HISTORY),
-        "1000,1365",
+        "1000,1480",
     ),
 }
 

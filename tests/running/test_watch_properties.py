@@ -99,3 +99,10 @@ def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
 def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
     events = find_events(take_whole_record(make_pushed_history(5.0), 0.06))
     assert "flight" not in {event.event for event in events}
+
+
+def test_a_momentum_that_never_changes_is_that_of_a_flight_without_gravity() -> None:
+    """A fit of gravity and damping would find only what rounding leaves of it."""
+    history = cut_history(make_pushed_history(0.0), PUSHES[0][0])
+    (flight,) = take_whole_record(history).flights()
+    assert (flight.start, flight.gravity, flight.end) == (0.0, 0.0, None)

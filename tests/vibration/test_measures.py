@@ -45,7 +45,6 @@ def test_each_measure_has_a_column() -> None:
         paper.TD,
         tr,
         lambda error, *_: (error, error - 0.1, error + 0.1),
-        of_parts=True,
     )
     assert (*columns,) == measures.Measured._fields
     assert {column.shape for column in columns.values()} == {tr.shape}

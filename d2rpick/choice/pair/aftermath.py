@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
-# Relative error of vibration energies from spectral lines, oscillation counts or part signs [-].
+# Relative error of vibration energies from spectral lines, or oscillation counts [-].
 _KNOWN_WITHIN: Final = 0.1
 # Largest assumed number of similar modes with random phases; a computed car had 100 such modes.
 # The energy of m such modes has a relative standard deviation of 1/sqrt(8 m).

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Off
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Columns
-    from d2rpick.vibration.part_signs import PartMatch
 
 
 # Largest number of candidates that are judged together. Larger arrays are not faster, and noise makes tens of
@@ -45,18 +44,17 @@ class Candidate(Measured, Record):
     """One tr for the td of a situation; the fields are the keys of the JSON output, None for unknown values.
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
-    unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several parts
-    or modes, "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is
+    unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several modes,
+    "start" of a flight in which nothing vibrates, or "given" for a pair to be verified.  ``level_ratio`` is
     E(tr)/E(td).  ``admissible``: the tr lies in the flight, with the sign of td and an error within the tolerance;
     otherwise ``notes`` give the reasons.  ``acceptable``: admissible, with a residual of at most 0.5.
     ``run_time_share`` is the expected run time over that of the reference run.  ``same_swing``: the energy turns less
     than twice from tr to td, so that hardly anything is saved.  ``residual_high`` is the largest residual if what the
-    model does not explain is a further mode.  ``parts`` lists the mismatch of each part, empty if single parts are
-    unknown.  ``position_error`` is the distance of a body from its place at td [length], because
-    ``position_error_part`` is frozen elsewhere.  Of several bodies it is the largest; ``position_error_body`` lists the
-    parts of that body.  ``position_error_assumes`` names the assumption made if no deck defines which parts become one
-    body.  ``position_error_is_lower_bound``: the error may be larger, through internal motion that looks like rotation
-    of the body.
+    model does not explain is a further mode.  ``position_error`` is the distance of a body from its place at td
+    [length], because ``position_error_part`` is frozen elsewhere.  Of several bodies it is the largest;
+    ``position_error_body`` lists the parts of that body.  ``position_error_assumes`` names the assumption made if no
+    deck defines which parts become one body.  ``position_error_is_lower_bound``: the error may be larger, through
+    internal motion that looks like rotation of the body.
     """
 
     rank: int
@@ -76,7 +74,6 @@ class Candidate(Measured, Record):
     notes: tuple[str, ...]
     run_time_share: float | None = None
     same_swing: bool = False
-    parts: tuple[PartMatch, ...] = ()
     position_error: float | None = None
     position_error_part: str | None = None
     position_error_body: str | None = None
@@ -358,7 +355,6 @@ class Candidates(Sequence[Candidate]):
         if values["position_error"] is not None and situation.bodies:
             values |= _describe_position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / history.duration
-        parts = situation.vibration.part_matches(tr) if is_compared else ()
         notes = list[str]()
         for objection in judged.objections:
             if objection.holds[i]:
@@ -368,7 +364,7 @@ class Candidates(Sequence[Candidate]):
         is_kept = residual is None or residual <= POOR_RESIDUAL
         if values["same_swing"]:
             notes.append(_SAME_SWING)
-        notes += _list_remarks(situation, reach, values if is_compared else {}, parts)
+        notes += _list_remarks(situation, reach, values if is_compared else {})
         level_ratio = None
         if situation.energy_td > 0 and not situation.at_rest:
             level_ratio = values["energy"] / situation.energy_td
@@ -386,7 +382,6 @@ class Candidates(Sequence[Candidate]):
             recommended=rank == self.recommended,
             notes=tuple(notes),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
-            parts=parts,
             **values,
         )
 
@@ -486,18 +481,10 @@ def _list_remarks(
     situation: Situation,
     reach: float,
     measured: Mapping[str, Any],
-    parts: Sequence[PartMatch],
 ) -> Iterator[str]:
     """Yield the notes on a tr that do not affect whether it is acceptable."""
     if not (measured or situation.vibration.unknown or situation.at_rest):
         yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
-    if measured and measured["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
-        # Imported here to keep start-up fast.
-        from d2rpick.vibration.part_signs import (
-            name_main_contributors,
-        )
-
-        yield f"mismatch of {name_main_contributors(parts)}"
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:

@@ -18,7 +18,7 @@ from d2rpick.flight.flight import Flight, Seen, find_seen_flight
 from d2rpick.flight.internal_energy import find_largest, find_quiet_time, round_off
 from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.histories.digits import sum_times_as_read
-from d2rpick.vibration import find_models, find_part_signs
+from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.model import (
     Evidence,
@@ -116,7 +116,7 @@ class AnswerAtTd:
 
     @property
     def basis(self) -> str:
-        """Basis of the answer: ``"parts"``, ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
+        """Basis of the answer: ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
         return self.situation.basis
 
     @property
@@ -155,7 +155,7 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """Basis of a choice: "parts", "oscillator", "modal", "swings" or "energy"."""
+        """Basis of a choice: "oscillator", "modal", "swings" or "energy"."""
         return self.vibration.basis
 
     @property
@@ -309,20 +309,13 @@ def examine_td(
             modes = find_described(history, td, guess)
             described = _choose_longer_window(described, modes)
     flight = choose_flight(
-        history,
-        td,
-        seen,
-        described,
-        quiet,
-        after=settings.after,
-        landing=settings.landing,
+        history, td, seen, described, quiet, settings.after, settings.landing
     )
     evidence = Evidence(fit, span, settings.oscillator is not None, prescribed=is_given)
     situation = Situation(history, td, settings, flight, evidence)
     if not settings.replay:
         return situation
-    is_flying = seen.flight is not None and not seen.refusal
-    models = _find_other_models(situation, is_flying=is_flying)
+    models = _find_other_models(situation)
     if not models:
         return situation
     return replace(situation, evidence=evidence._replace(models=models))
@@ -358,42 +351,25 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
         history.check(*settings.fit_window, argument="fit_window")
 
 
-def _find_other_models(
-    situation: Situation, *, is_flying: bool
-) -> dict[str, SignedModel]:
-    """Find the vibration models needed in addition to the oscillator; ``is_flying`` is True if the parts fly at td."""
-    history = situation.history
-    td = situation.td
+def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
+    """Find the vibration models needed in addition to the oscillator."""
     flight = situation.flight
-    first = history.start
-    last = history.end
-    # Without evidence of the next contact, nothing is known about the time after td.
-    is_described = situation.evidence.span is not None or flight.source == "oscillator"
-    end = flight.end or (last if is_flying or is_described else td)
-    start = first if flight.start is None else flight.start
-    around = Span(min(td, start), end)
-    is_guessed = flight.start is not None and flight.source == "energy"
-    if is_guessed:
-        # Imported here to keep start-up fast.
-        from d2rpick.vibration.modal_span import get_inner_window, get_outer_window
-
-        # The energy alone shows a slightly different flight for each td. Part signs are therefore followed in wider
-        # windows, of which there are only a few: the vibration itself shows the times at which a load still acts.
-        around = get_outer_window(history, around)
-    models = find_part_signs(history, around)
-    is_sign_known = any(model.signed for model in models.values())
-    if flight.start is None or is_sign_known or not is_doubtful(situation.whole):
-        return models
-    in_flight = Span(flight.start, flight.end or last)
+    if flight.start is None or not is_doubtful(situation.whole):
+        return {}
+    history = situation.history
+    in_flight = Span(flight.start, flight.end or history.end)
     settled = in_flight
     if flight.settled is not None:
         settled = in_flight._replace(start=flight.settled)
-    if is_guessed:
+    if flight.source == "energy":
+        # Imported here to keep start-up fast.
+        from d2rpick.vibration.modal_span import get_inner_window
+
+        # The energy alone shows a slightly different flight for each td. Modes are therefore identified in a few
+        # windows that many td share.
         inner = get_inner_window(history, in_flight)
-        in_flight = inner if inner.start < td <= inner.end else in_flight
-    return models | find_models(
-        history, in_flight, settled, together=situation.together
-    )
+        in_flight = inner if inner.start < situation.td <= inner.end else in_flight
+    return find_models(history, in_flight, settled, together=situation.together)
 
 
 def make_look(

@@ -68,7 +68,7 @@ def warn_about_td(situation: Situation) -> Iterator[Caution]:
         )
     yield from _warn_about_energy(situation)
     yield from warn_about_few_states(situation)
-    yield from _warn_about_parts(situation)
+    yield from _warn_about_model(situation)
     yield from _warn_about_flight(situation)
 
 
@@ -112,8 +112,8 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
         )
 
 
-def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
-    """Yield the warnings about the states and the signs of parts."""
+def _warn_about_model(situation: Situation) -> Iterator[Caution]:
+    """Yield the warnings about the states, and about an estimated kinetic fraction."""
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
@@ -130,8 +130,6 @@ def _warn_about_parts(situation: Situation) -> Iterator[Caution]:
             "kinetic-share-estimated",
             f"the kinetic fraction is an estimate: it is what {vibration.estimated}",
         )
-    for part in vibration.signed.unsigned if vibration.signed else ():
-        yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
 
 def _warn_about_flight(situation: Situation) -> Iterator[Caution]:

@@ -13,12 +13,12 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Formats with families of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
+# Formats that split a run into a family of files (d3plot, d3plot01, ...); only its first file has a header.
 FAMILIES: Final = ("d3thdt", "d3plot")
 
 
 class Listed(NamedTuple):
-    """Description of a format, available before its reader (the ``module``) is imported.
+    """A file format as it is known before its reader (the ``module``) is imported.
 
     The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
     names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
@@ -32,9 +32,9 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# The order is that in which formats are tried, and preferred as the source of a quantity.
-# Binary files come before text files, because they have more digits.
-# csv accepts any text, so it comes after them; rare files come last.
+# Formats are tried in this order. Earlier formats are preferred as the source of a quantity.
+# Binary files come before text files, because their numbers have more digits.
+# csv comes after the other texts, because it accepts any text; rare formats come last.
 READERS: Final[Mapping[str, Listed]] = {
     "binout": Listed(
         "binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"

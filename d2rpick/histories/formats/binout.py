@@ -1,4 +1,4 @@
-"""Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one leg of a run.
+"""Read LS-DYNA's binout: the branches glstat (whole model) and matsum (parts) of one restart segment of a run.
 
 A branch has a directory ``metadata`` (title, version, part ids, part titles) and one directory per state,
 ``d000001`` and so on, of variables such as ``internal_energy``: one value in glstat, one per part in matsum.
@@ -36,16 +36,16 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one leg, because a solver continues and distributes a binout in one folder."""
+    """Open the files of each folder as one restart segment; a solver writes all files of a binout to one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
-        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  starts faster
+        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
         folders.setdefault(folder, []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
 
 
 class Binout(Database):
-    """All binout files of one leg, in the order of their family, read as one `Database`.
+    """All binout files of one restart segment, in the order of their family, read as one `Database`.
 
     Raises FormatError if a file is not a binout, or if none of them has glstat, matsum or contact forces.
     """
@@ -83,8 +83,8 @@ class Binout(Database):
         self.channels = tuple(name for name in whole.scalars if name != "time")
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]
-        """The parts of matsum, in the order of the first list of ids."""
+    def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # a property overrides a field
+        """The parts of the matsum branch, in the order of its first list of ids."""
         _, branch = self._branches
         return tuple(
             Part(number, branch.legend.get(number, "")) for number in branch.part_ids
@@ -92,7 +92,7 @@ class Binout(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts, with both sides combined, and of the rigid walls."""
+        """Forces of the contacts (one force for both sides), and of the rigid walls."""
         return read_binout_forces(self._files)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
@@ -112,7 +112,7 @@ class Binout(Database):
         raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        """Return the message that no file of the leg has a branch of this name."""
+        """Return the message that no file of the restart segment has a branch of this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
             f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "

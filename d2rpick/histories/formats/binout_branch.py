@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Number of values gathered at a time; it keeps the index arrays small compared with the result.
+# Number of values read at a time; it keeps the index arrays small compared with the result.
 _CHUNK: Final = 1 << 17
 
 
@@ -41,27 +41,27 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Yield groups with so few states that ``width`` values of each fit into a chunk."""
+        """Split the group into groups with so few states that ``width`` values of each state fit into a piece."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
             yield Group(self.file, self.layout, self.rows[part], self.starts[part])
 
     def values(self, variable: Variable, indices: Indices) -> NDArray[Any]:
-        """Return the values of a list at ``indices``, shape (states, indices); reals as doubles."""
+        """Return the values at ``indices`` of a list, shape (states, indices), as integers or doubles."""
         positions = (
             self.starts[:, None] + variable.offset + variable.dtype.itemsize * indices
         )
         values = self.file.read(positions, variable.dtype)
         if variable.dtype.kind != "f":
             return values
-        # a NaN is refused later, unless the value is not used
+        # A NaN is refused later, unless the value is not used.
         with np.errstate(invalid="ignore"):
             return values.astype(np.float64)
 
 
 def _read_start(file: Lsda, branch: str) -> float:
-    """Return the time of the first state of a branch in a file, -inf if the state has none."""
+    """Return the time of the first state of a branch in a file, or -inf if the state contains no time."""
     _, start, layout = file.visits[branch][:3]
     variable = file.layouts[layout].variables.get("time")
     if variable is None or not variable.count:
@@ -70,7 +70,7 @@ def _read_start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Return True if the last state of this branch in a file has another layout than the state before."""
+    """Return True if the last state of this branch in a file has another layout than the previous state."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 
@@ -78,7 +78,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield evidence, from the states of one file, that records are lost or misplaced."""
+    """Yield the signs that records of one file are lost or misplaced, as text."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
@@ -130,7 +130,7 @@ class Branch(Database):
             (file for file in files if file.visits[name]),
             key=lambda file: _read_start(file, name),
         )
-        # Names of the files whose last state is left out.
+        # Names of the files whose last state is not used, because it is incomplete.
         self._unfinished = [
             file.source for file in visited if _is_unfinished(file, name)
         ]
@@ -240,7 +240,7 @@ class Branch(Database):
             ids = _read_integers(file, start, layout, "legend_ids")
             legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
-                continue  # the titles cannot be separated, because their length varies
+                continue  # The titles cannot be separated, because their length varies.
             raw = file.raw(start, legend)
             width = legend.count // ids.size
             for i, id_ in enumerate(ids.tolist()):
@@ -249,8 +249,8 @@ class Branch(Database):
 
     @cached_property
     def part_ids(self) -> tuple[int, ...]:
-        """Ids of all parts that occur in any state, in the order of the lists."""
-        # a dictionary serves as a set that keeps its order
+        """Ids of all parts that occur in any state, in the order of the lists of ids."""
+        # A dictionary is used as a set that keeps its order.
         part_ids: dict[int, None] = {}
         for group in self._groups:
             for part in group.chunks(max(self._list_lengths(group), default=1)):
@@ -328,13 +328,13 @@ class Branch(Database):
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Return the plausible numbers of values in a state: one, one per part, or as many as in the first state."""
+        """Return the plausible numbers of values of a variable: one, one per part, or as many as in the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}
 
     def _list_lengths(self, group: Group) -> set[int]:
-        """Return the possible numbers of parts in a group: from its own list of ids, or from the metadata."""
+        """Return the possible numbers of parts in a group, from its list of ids or the lists in the metadata."""
         ids_of_states = group.layout.variables.get("ids")
         if ids_of_states:
             return {ids_of_states.count}
@@ -382,7 +382,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state applies. The file of an MPI rank may contain its list after the first states.
+        # The last list before a state applies to it. A file of an MPI rank may have its list after its first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {

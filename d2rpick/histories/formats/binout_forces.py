@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Branches with forces; for each, the name of what exerts them.
+# Branches that contain forces, each with the kind of object that exerts the force.
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force for each contact: its sides have opposite forces, or one side has none."""
+    """Yield one force for each contact. Its two sides have opposite forces, or only one side has a force."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

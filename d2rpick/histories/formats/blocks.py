@@ -1,4 +1,4 @@
-"""Describe the blocks of solver text files: their layout, their number, and the numbers in them."""
+"""Describe the blocks of solver text files, count repeated blocks, and read the numbers in them."""
 
 from __future__ import annotations
 
@@ -20,26 +20,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# stands for the offset of a field that is truncated, or occurs twice in the block
+# Stands for the offset of a field that is truncated, or that occurs twice in the block.
 UNSURE: Final = -1
 
-_OVERLONG: Final = 512  # length of a line that exceeds all lines of solvers [bytes]
+# length [bytes] from which a line is longer than any line of a solver
+_OVERLONG: Final = 512
 
-CHUNK: Final = 1 << 20  # number of bytes compared at once, which fit into the cache
-# number of adjacent blocks compared as one row, which halves the time
+# number of bytes compared at once; they fit into the processor's cache
+CHUNK: Final = 1 << 20
+# Number of adjacent blocks compared as one row, which halves the time.
 _FOLD: Final = 16
-# largest block that is compared [bytes]; a longer block is read record by record
+# Largest block that is compared with other blocks [bytes]; longer blocks are parsed one by one.
 _LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
-_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-# Flags for a negative exponent and a negative number; with the two digits of the exponent they fill a byte.
+_EXACT: Final = 22  # largest exponent of a power of ten that a double holds exactly
+# Bit flags of a negative exponent and of a negative number; lower bits hold the two digits of the exponent.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
 
 class BlockLayout(NamedTuple):
-    """The layout of a block: the position of each field.
+    """The layout of a block of text: the position of each number in it.
 
     ``fields`` maps the name of a number to its offset in the block, or to UNSURE. ``literal``, shape (size of the
     block,), is 255 for the bytes that all blocks of this layout share, line ends among them, and 0 for the others, so
@@ -54,7 +56,7 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """Description of the blocks of a file format for the reader of blocks.
+    """Description of the blocks of one file format, from which the blocks of a file can be read.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
     these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
@@ -87,7 +89,7 @@ class Grammar(NamedTuple):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
         longest_line = max(map(len, block.split(b"\n")))
-        if longest_line >= _OVERLONG:  # a damaged line may hide further states
+        if longest_line >= _OVERLONG:  # A damaged line may hide further states.
             fields = {
                 name: offset if name == self.time else UNSURE
                 for name, offset in fields.items()
@@ -118,7 +120,7 @@ def make_head(title: str, database: str) -> str:
 
 
 class Stretch(NamedTuple):
-    """``repeats`` blocks of ``stride`` bytes from byte ``start`` on, with the layout of the block at ``example``."""
+    """``repeats`` equal blocks of ``stride`` bytes, from ``start`` on, with the layout of the block at ``example``."""
 
     start: int
     stride: int
@@ -197,14 +199,14 @@ def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
-    # A bit is the same in all rows and the example if AND and OR of the rows agree with it.
+    # A bit equals that of the example in all rows if AND and OR of the rows both equal the example.
     bits_of_all = _reduce_rows(np.bitwise_and, rows, size)
     bits_of_any = _reduce_rows(np.bitwise_or, rows, size)
     return np.asarray((bits_of_all ^ example) | (bits_of_any ^ example))
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Merge the blocks of several rows, each of one or more blocks of ``size`` bytes, into one block."""
+    """Combine rows of one or more blocks of ``size`` bytes into one block by a bitwise operation."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -277,7 +279,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of them is always 1.
+    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
 
     Both are NaN if the conversion would be inexact.
     """
@@ -341,7 +343,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     mark = width - 4
     negative = column[point - 2] == ord("-")
     shrinks = column[mark + 1] == ord("-")
-    # uint8 wraps around below "0", so one comparison is enough
+    # uint8 wraps around below "0", so one comparison finds all characters that are not digits.
     digits = column[
         [point - 1, *range(point + 1, mark), mark + 2, mark + 3]
     ] - np.uint8(ord("0"))
@@ -352,9 +354,8 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    values: Samples = weights @ digits[:-2].astype(
-        np.float64
-    )  # mantissas are exact up to here
+    # The mantissas are still exact here.
+    values: Samples = weights @ digits[:-2].astype(np.float64)
     tens, units = digits[-2:]
     scale = (
         tens * np.uint8(10)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 _COMMENTS: Final = ("#", "$", "%", "//")
 # Values that spreadsheets write if a computation fails, in English and German.
-# They begin with the comment character "#", but a line that begins with one of them is a row.
+# A line that begins with such a value is a row, although "#" is the comment character.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -30,20 +30,20 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-# Pattern of the characters that replace a number too wide for its field.
+# Pattern of the characters that replace a number that is too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
-# Patterns of a number, by the decimal sign.
-# The quantifiers are possessive (no backtracking), so that the time is linear in the length of a cell.
+# Pattern of a number for each decimal sign.
+# The possessive quantifiers avoid backtracking, so that the time is linear in the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
-# Pattern of a number with thousands separators; the separator and the decimal sign are inserted.
+# Template of a number with thousands separators; separator and decimal sign are inserted into the template.
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
-# Thousands separators that are tried after "." or "," (the one that is not the decimal sign).
+# Thousands separators that are tried in addition to "." or ",".
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# A date, clock time or percentage: not a number, but no indication of a wrong separator.
+# Pattern of a date, clock time or percentage. Such a cell is no number, but does not show a wrong separator.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )

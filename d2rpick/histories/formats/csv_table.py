@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
-# Names that spreadsheets, pandas and other programs give to the column of row numbers.
+# Names that spreadsheets, pandas and other programs give to a column of row numbers.
 _ROW_NUMBERS: Final = frozenset(
     {
         "column 1",
@@ -66,7 +66,7 @@ def label_columns(layout: Layout, time: int) -> dict[str, int]:
 
 
 def find_own_times(layout: Layout) -> tuple[int, ...]:
-    """Return the time columns of a table of curves side by side (x, y, x, y); () for other tables."""
+    """Return the time columns of a table that lists curves side by side (x, y, x, y); () for other tables."""
     times = tuple(
         column for column in range(0, layout.trusted, 2) if is_time(layout.name(column))
     )
@@ -81,7 +81,7 @@ def find_own_times(layout: Layout) -> tuple[int, ...]:
 def find_numeric_columns(
     layout: Layout, sample: Sequence[Sequence[str]]
 ) -> frozenset[int]:
-    """Return the columns that contain a number in at least one sampled row; all columns if there is no row."""
+    """Return the columns that contain a number in at least one sampled row; all columns if no row was sampled."""
     columns = range(layout.columns)
     if not sample:
         return frozenset(columns)
@@ -93,7 +93,7 @@ def find_numeric_columns(
 
 
 def _sample_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
-    """Return the cells of sampled rows, from the start, from the end and evenly between."""
+    """Return the cells of sampled rows: the first rows, the last rows, and rows evenly spaced in between."""
     lines = [line for line in text.sample(begin) if not is_skipped(line)]
     rows = [split_cells(line, layout.separator) for line in lines]
     return [row for row in rows if len(row) >= layout.columns]
@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column, and notes on assumptions. For curves side by side it belongs to the first energy.
+    """Return the time column, and notes on assumptions. If curves are side by side, use the time of the first energy.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column other than times, or the only column named like an internal energy."""
+    """Return the only numeric column other than times, or the only column whose name means an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -204,12 +204,12 @@ def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if the first bytes of a file are text; whether it is a table is known after reading it."""
+    """Return True if the first bytes of a file are text; only reading the file shows if the text is a table."""
     return head.startswith(UTF16) or b"\0" not in head
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves. The selection names the time and the columns that a last line must have."""
+    """Open text files as tables or curves. Only a last line that has the selected columns is used."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -228,7 +228,7 @@ class Table(Database):
         self._begin = text.place(layout.start)
         sample = _sample_rows(text, self._begin, layout)
         self._layout = layout = add_thousands(layout, sample)
-        # cells of the sampled rows, with decimal points
+        # Cells of the sampled rows, in which "." is the decimal sign.
         self._sample = sample
         if layout.decimal != "." or layout.thousands:
             self._sample = [[layout.plain(cell) for cell in row] for row in sample]
@@ -244,7 +244,8 @@ class Table(Database):
         self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        self._together = True  # corrected when a row shows that a column is not numeric
+        # False after a row has shown that a column is not numeric.
+        self._together = True
         if not is_skipped(text.unended):
             self.complete = _is_whole_row(
                 text.unended, self._sample, layout, self._needed
@@ -260,11 +261,11 @@ class Table(Database):
         self._notes += [*notes, *left_out]
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy that the head of a column contains; empty without one."""
+        """Return the unit of energy in the header of a column; empty if the header contains no unit."""
         return check_energy_unit(self._layout.unit(self._columns[channel]))
 
     @property
-    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
         """Notes on assumptions and omissions; complete only after the required columns were read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
@@ -322,7 +323,7 @@ class Table(Database):
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if the table has one row for each part at each time."""
-        # imported here to start faster
+        # Imported here to keep start-up fast.
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
         for column in self._needed[1:]:
@@ -362,11 +363,11 @@ class Table(Database):
 
     @cached_property
     def _printed(self) -> list[list[str]]:
-        """The sampled rows within the table: neither after the end of a curve nor words below the table."""
+        """The sampled rows of the table itself, without rows after the end of a curve and lines below the table."""
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
-        """Return the requested (or default) columns. A last line without a line end is used only if it has them all."""
+        """Return the requested (or default) columns. An unterminated last line is used only if it has all of them."""
         try:
             names = [self.find(wanted) for wanted in selection.energy] or [
                 self.energy_channel
@@ -382,8 +383,8 @@ class Table(Database):
         if column in self._failed:
             raise self._failed[column]
         if column not in self._read and self._together:
-            # The required columns are read first, with the columns that show a flight.
-            # A request for another column is mostly followed by requests for the rest, so all are read then.
+            # The first pass over the table reads the required columns, and the columns that show a flight.
+            # The second pass over the table reads all other columns, because requests for them mostly follow.
             quantities = [
                 position
                 for name, position in self._columns.items()
@@ -394,7 +395,7 @@ class Table(Database):
                 wanted = {*range(self._layout.columns)} - self._read.keys()
             try:
                 self._keep([self._time, *(wanted - {self._time})])
-            except FormatError:  # the error may be in a column that is not needed
+            except FormatError:  # The error may be in a column that is not needed.
                 self._together = False
                 self._read_one_by_one(
                     [other for other in quantities if other != column]
@@ -421,20 +422,18 @@ class Table(Database):
                     )
 
     def _keep(self, columns: Sequence[int]) -> None:
-        """Read these columns and keep them."""
+        """Read these columns of the table and store them."""
         table = read_columns(self._text, self._begin, self._layout, columns)
         self._notes += [note for note in table.notes if note not in self._notes]
         for column, values in zip(columns, table.columns, strict=True):
-            values.flags.writeable = (
-                False  # read-only, so that callers can share the array without copies
-            )
+            values.flags.writeable = False  # The array is read-only, so that callers can share it without copies.
             self._read[column] = values
 
 
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if an unterminated line has all values, and its last value is unused or of constant length."""
+    """Return True if an unterminated line has all values, and its last value is unused or certainly complete."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
@@ -443,7 +442,7 @@ def _is_whole_row(
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    r"""Return a table of columns (n,) under their names, each number in the fewest digits that restore it.
+    r"""Write a table of columns (n,) under their names, each number in the fewest digits that restore it.
 
     Examples
     --------

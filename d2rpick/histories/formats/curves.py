@@ -36,13 +36,14 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
-_LONGEST_LABEL: Final = 1000  # characters; limits the search in a longer line
-# Type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
+# largest number of characters of a line that are searched for a label
+_LONGEST_LABEL: Final = 1000
+# Pattern of the type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
-# x label, y label and name of the curve; the title may be blank
+# Smallest number of labels above a curve: x label, y label and name of the curve; the title may be blank.
 _FEWEST_LABELS: Final = 3
-# largest number of digits in a number of pairs; a longer number is damaged
+# Largest number of digits in a number of pairs; a longer number is damaged.
 _MOST_DIGITS: Final = 12
 
 
@@ -50,7 +51,7 @@ class _TextCurve:
     """A curve: its name, its pairs as text cells, and the line numbers of the pairs."""
 
     def __init__(self, name: str) -> None:
-        from array import array  # imported here to start faster
+        from array import array  # Imported here to keep start-up fast.
 
         self.name = name
         self.times: list[str] = []
@@ -68,7 +69,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State of the reader: the curves so far, the label of their x axis, and the unfinished curve."""
+    """State of the reader of a text of curves: the curves so far, and the label of their x axis."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -76,10 +77,10 @@ class _CurveText:
         self.curves: list[_TextCurve] = []
         self.x_label = self.time_unit = ""
         self.stops = ""
-        self.last = 0  # number of the last line
+        self.last = 0  # number of the line that was read last
 
     def top(self, count: int) -> list[str]:
-        """Return the first lines that are neither blank nor comments."""
+        """Return the first lines of the text that are neither blank nor comments."""
         unended = [self._text.unended] if self._text.is_short else []
         return list(
             islice(filter(_has_content, chain(self._text.head, unended)), count)
@@ -222,7 +223,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # parse_cell returns None for a string that is not a number; numpy turns None into NaN
+        # parse_cell returns None for a string that is not a number, and numpy turns None into NaN.
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
@@ -270,7 +271,7 @@ def _read_curveplot(text: _CurveText) -> bool:
 def _read_t_his(text: _CurveText) -> bool:
     """Read a .cur file of T/HIS; return False for any other text."""
     top = [_remove_type(line) for line in text.top(5)]
-    # the title may be blank, so the x label is the first or second label
+    # The title may be blank, so the x label is the first or the second label.
     labels = list(takewhile(lambda line: not _is_pair(line), top))
     x_label = next((i for i in (0, 1) if i < len(labels) and is_time(labels[i])), None)
     if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):

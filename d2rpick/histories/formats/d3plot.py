@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.floating[Any]]
 
-# Values of the whole model after the time of a state.
+# Values of the whole model, in the order in which they follow the time of a state.
 _MODEL: Final = (
     "kinetic_energy",
     "internal_energy",
@@ -46,7 +46,7 @@ _MODEL: Final = (
     "z_velocity",
 )
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
-# For each quantity: the number of values of a part before it. Each is stored for all parts; a velocity has 3 values.
+# For each quantity: the number of values that precede it in the data of a part.
 _OF_PARTS: Final = {
     "internal_energy": 0,
     "kinetic_energy": 1,
@@ -67,7 +67,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each family of files as a leg of the run; a family starts with a file that has a header."""
+    """Open each family of files as a restart segment of the run; its first file has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")
@@ -83,7 +83,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """The states: ``rows`` (n, values) has their first words; ``ended`` is True if each file has its end mark."""
+    """First words of the states of a family, ``rows`` (n, values); ``ended`` is True if each file has its end mark."""
 
     rows: Rows
     ended: bool = True
@@ -136,7 +136,7 @@ class D3plot(Database):
                 f"{self.source}: no {name}, there are {list_names(self.channels)}; ask for one of these"
             )
         index = self.channels.index(name)
-        # the forces of rigid walls follow the values of the parts
+        # The forces of rigid walls follow the values of the parts.
         of_parts = self._head.part_values * len(self.parts) if index >= GLOBALS else 0
         return self._column(1 + index + of_parts)
 
@@ -197,7 +197,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         max(0, len(content) - begin) // head.state
         for content, begin in zip(contents, begins, strict=True)
     ]
-    # total number of states up to the end of each file
+    # Number of states up to the end of each file.
     ends = np.cumsum(counts).tolist()
     heads = np.empty((ends[-1], values * real.itemsize), np.uint8)
     first_words_after = [
@@ -218,7 +218,8 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        return _States(rows)  # the usual case, which needs no check of each file
+        # Usually each file is complete and needs no check of its own.
+        return _States(rows)
     states_of_files = []
     for file, begin, piece, word in zip(
         files, begins, np.split(rows, ends[:-1]), first_words_after, strict=True
@@ -236,7 +237,7 @@ def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
     """Return True if times are finite and ascend in each file; ``ends`` counts the states up to each file end."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    # a restart may write a state again at the start of a file
+    # A restart may write a state again at the start of a file.
     ascends[[end - 1 for end in ends if 0 < end < time.size]] = True
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
@@ -256,7 +257,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # this file contains no states: they begin in the next file
+        ended = True  # The states begin in the next file of the family.
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
@@ -284,12 +285,12 @@ def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
 
 
 def _is_blank(content: Content, begin: int, size: int) -> bool:
-    """Return True if there are only zeros, with which a solver pads a file; node coordinates are never all 0."""
+    """Return True if a range of a file contains only zeros, with which a solver pads the file."""
     return not content[begin : begin + min(size, _TAIL)].strip(b"\0")
 
 
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
-    """Raise FormatError if the end mark of a file is inside a state, whose length is then wrong."""
+    """Raise FormatError if the end mark of a file lies inside a state, which shows that the state length is wrong."""
     first = max(begin, len(content) - _TAIL)
     tail = content[first : len(content)]
     mark = np.array(END, head.form.real).tobytes()
@@ -304,7 +305,7 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
 
 
 def _note_missing_files(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Return a note on the file numbers that are missing in a family."""
+    """Return a note on the missing numbers in the file names of a family."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
     ]

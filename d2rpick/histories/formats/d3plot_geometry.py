@@ -1,4 +1,4 @@
-"""Skip the sections between control words and states of a d3plot: nodes, elements, part ids, titles.
+"""Skip the sections between the control words and the states of a d3plot: nodes, elements, part ids, titles.
 
 Only sections that describe the states are read; the others are skipped by the lengths that the control words give.
 """
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 _WITH_MATERIAL_TYPES: Final = (5, 7)
 _WITH_ROADS: Final = (6, 7, 9)
 WITH_RIGID_BODIES: Final = (8, 9)
-# Words per element of each kind in the section after the numbers of nodes and elements.
+# Words per element of each kind in the sections of additional nodes.
 _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # length [words] of the section of numbers before the ids
-# length [words] of the head of the section of numbers if it has part ids
+_NUMBERING: Final = 10  # length of the section of numbers before its ids [words]
+# Length of the head of the section of numbers if it also lists part ids [words].
 _PART_NUMBERING: Final = 16
-_TITLE: Final = 72  # length of a title [bytes], the same for both word widths
+_TITLE: Final = 72  # length of a title [bytes]; it does not depend on the word width
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
@@ -38,7 +38,7 @@ _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles, which are skipped in order.
+    """The sections between the control words and the titles; they are skipped one after the other.
 
     ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
     the order of their definition; empty if the file has none. The other attributes count the values in a state.
@@ -70,7 +70,7 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Read this number of counts; raise FormatError if one is negative."""
+        """Read ``count`` integers from the file, and advance; raise FormatError if one of them is negative."""
         counts = self._words.integers(self.at, count)
         if min(counts) < 0:
             raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")
@@ -78,7 +78,7 @@ class Geometry:
         return counts
 
     def _material_types(self) -> None:
-        """Skip the material types; count the shells of rigid parts, which have no values."""
+        """Skip the material types; count the shells of rigid parts, for which a state has no values."""
         if self._control["ndim"] in _WITH_MATERIAL_TYPES:
             self.rigid_shells, materials = self._next(2)
             self.at += materials
@@ -90,7 +90,7 @@ class Geometry:
         begin = self.at
         (length,) = self._next(1)
         flags = self._words.integers(begin + 1, 10)
-        # older files have no word for history variables
+        # Older files have no word for history variables.
         histories = flags[-1] if length > len(flags) else 0
         self.values_of_sph = 1 + sum(abs(flag) for flag in flags[:-1]) + histories
         self.at = begin + length
@@ -102,9 +102,9 @@ class Geometry:
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        # this version of the airbag data has a word for the number of chambers
+        # Version 4 of the airbag data has a word for the number of chambers.
         self.at += version == 4
-        # each value has a type and a name
+        # Each value has a type and a name.
         self.at += 9 * (of_geometry + of_particle + of_airbag)
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle
@@ -119,7 +119,7 @@ class Geometry:
         self.at += count_dimensions(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
-        # the start of the section of numbers shows where the additional nodes are
+        # The start of the section of numbers shows where the additional nodes are.
         follows = not more_nodes or self._begins_numbering(
             self.at + more_nodes + shells
         )
@@ -197,7 +197,7 @@ class Geometry:
 
 
 class Titles:
-    """The titles after the geometry; ``at`` is the byte after them, where states may begin."""
+    """The titles after the geometry; ``at`` is the byte after the titles, where the states may begin."""
 
     def __init__(self, words: Words, at: int) -> None:
         self._words, self.at = words, at
@@ -218,7 +218,7 @@ class Titles:
                 self.at += width
 
     def _section(self) -> bool:
-        """Read the section that begins here; return False if it is not a section of titles."""
+        """Read the section of titles that begins here; return False if another section begins here."""
         (kind,), width = self._integers(1), self._words.form.width
         if kind == _RUN_TITLE:
             self.of_run = clean_text(self._words.bytes(self.at + width, _TITLE))
@@ -241,6 +241,6 @@ class Titles:
         return True
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read this number of integers without advancing."""
+        """Return this number of integers without advancing in the file."""
         integers = self._words.bytes(self.at, count * self._words.form.width)
         return tuple(np.frombuffer(integers, self._words.form.integer).tolist())

@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-# Values of the whole model: kinetic, internal and total energy, and the velocity.
+# Number of values of the whole model: kinetic, internal and total energy, and three velocity components.
 GLOBALS: Final = 6
 
-# stands in place of the number of parts in files packed by femzip
+# Value in place of the number of parts in files that femzip packed.
 _FEMZIP: Final = 76_893_465
-# Up to this value of ``maxint`` a state lists deleted elements, otherwise deleted nodes.
+# Largest ``maxint`` with which a state lists deleted elements instead of deleted nodes.
 _BY_ELEMENT: Final = -10_000
-# From this release on a state has the position of a rigid wall next to its force.
+# First release whose states contain the position of a rigid wall next to its force.
 _WITH_WALL_PLACES: Final = 971.0
 
-# Thermal values of a node by flag: temperatures of one layer or three, and heat flux.
+# Number of thermal values of a node by flag: temperatures of one or three layers, and heat flux.
 _THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 
 
 class Head(NamedTuple):
-    """The description of the states in the first file of a family.
+    """The layout of the states of a family, as described in the header of its first file.
 
     States begin at byte ``begin`` of it; each has ``state`` bytes. In a state, ``globals`` words follow the time: the
     values of the model, ``part_values`` quantities of each part, and the forces of ``walls`` rigid walls.

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-# end mark of the geometry, the titles, and the states of each file
+# end mark of the geometry, of the titles, and of the states of each file
 END: Final = -999999.0
-HEAD: Final = 512  # length of the control words if a word has 8 bytes [bytes]
-# number of control words in any file; ``extra`` is the number of additional control words
+HEAD: Final = 512  # Length of the control words if a word has 8 bytes [bytes].
+# Number of control words in any file; ``extra`` is the number of additional control words.
 CONTROL: Final = 64
 
 _PLACES: Final = {
@@ -35,15 +35,15 @@ _PLACES: Final = {
     "penout": 78, "engout": 79,
 }  # fmt: skip
 _SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
-# word that contains the name of the release; the release number follows
+# Index of the word that contains the name of the release; the release number follows.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # added to the file type if ids have 8 bytes
+LONG_IDS: Final = 1000  # number that is added to the file type if ids have 8 bytes
 _DIMENSIONS: Final = range(2, 10)
 
 
 class Form(NamedTuple):
-    """The number format: bytes of a word, and their order as a character of `struct`."""
+    """The number format of a file: the bytes of a word, and their order as a character of `struct`."""
 
     width: int
     order: str
@@ -60,7 +60,7 @@ class Form(NamedTuple):
 
 
 def detect_form(head: bytes) -> Form | None:
-    """Return the number format of a file with these first bytes; None if it belongs to no known family."""
+    """Return the number format of a file with these first bytes; None if it is neither a d3plot, d3thdt nor d3part."""
     for form in (Form(width, order) for width in (4, 8) for order in "<>"):
         if len(head) < CONTROL * form.width:
             continue
@@ -112,7 +112,7 @@ class Words:
 
     @property
     def is_named(self) -> bool:
-        """True if the release has a name that begins with R (R920, R12), rather than only a number."""
+        """True if the name of the release begins with R (R920, R12); older releases have only a number."""
         return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
 
     def version(self) -> str:
@@ -126,7 +126,7 @@ class Words:
         return tuple(np.frombuffer(data, self.form.integer).tolist())
 
     def ends_at(self, at: int) -> bool:
-        """Return True if there is an end mark at a byte."""
+        """Return True if an end mark begins at this byte."""
         data = self._content[at : at + self.form.width]
         if len(data) < self.form.width:
             return False
@@ -150,5 +150,5 @@ class Words:
 
 
 def count_dimensions(control: Mapping[str, int]) -> int:
-    """Return the number of coordinates of a node. Values of the control word above 3 contain flags."""
+    """Return the number of coordinates of a node; a control word above 3 contains flags too."""
     return min(control["ndim"], 3)

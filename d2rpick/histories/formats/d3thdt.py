@@ -1,4 +1,4 @@
-"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, usually written far more often."""
+"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, with a shorter output interval."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[d3plot.D3plot]:
-    """Open each family as a leg of the run."""
+    """Open each family as a restart segment of the run."""
     legs = d3plot.open_legs(sources, selection)
     for leg in legs:
         leg.format = "d3thdt"

@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     Fields = NDArray[np.bytes_]
 
 _RECENT: Final = 12  # number of recent layouts that are tried before a block is parsed
-# upper limit for the length of the first line of a block [bytes]
+# Upper limit for the length of the first line of a block [bytes].
 _LINE: Final = 1 << 10
 
 
 class Blocks(Database):
-    """Base class for the `Database` of a text file of blocks; it provides the complete states.
+    """Base class for a `Database` that reads a text file of blocks; it finds the complete states.
 
     Parameters
     ----------
@@ -68,9 +68,10 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # Number of equal blocks from which their differing bytes are stored, which then needs little memory.
+    # Smallest number of equal blocks for which the differing bytes are stored, so that this needs little memory.
     many = 64
-    batch = 1 << 14  # number of numbers converted at once, which fit into the cache
+    # number of numbers converted at once, which fit into the processor's cache
+    batch = 1 << 14
 
     def __init__(
         self,
@@ -84,21 +85,21 @@ class Blocks(Database):
         self._data = make_content(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        # Stored in packed form, so that a file whose blocks all differ does not fill the memory.
+        # The sequences are stored in packed form, so that a file whose blocks all differ does not fill the memory.
         self._runs = array("q")
         data = self._data
-        # does not refer to self, because a reference cycle would keep the file open
+        # The function below must not refer to self, because a reference cycle would keep the file open.
         end = self._end
         self.layout = lru_cache(maxsize=16)(
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # becomes True when a request has compared a part of each block
+        # True after a request has compared a part of each block.
         self._trusted = False
         # Bits that vary between the blocks of a long sequence of equal blocks, by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
         self._asked_ahead = tuple(ahead)
-        # Numbers copied as printed from the blocks of such a sequence, by the start of the sequence.
+        # Numbers copied as printed from the blocks of a long sequence of equal blocks, by the start of the sequence.
         self._ahead: dict[int, Fields] = {}
         self._walk()
         if not self._compared and not self._is_even():
@@ -136,9 +137,9 @@ class Blocks(Database):
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
         if tuple(names) == self._asked_ahead:
-            # the copied numbers are used once, since the caller keeps the result
+            # The copied numbers are used only once, because the caller keeps the result.
             taken, self._ahead = self._ahead, taken
-        # the system provides memory only when it is written
+        # The system allocates the memory of zeros only when it is written.
         values = np.zeros((self.states, len(names)))
         is_scattered = np.ones(self.states, bool)
         row = 0
@@ -148,7 +149,7 @@ class Blocks(Database):
             if run.start in self._varied:
                 self._read(values[rows], run, offsets, taken.get(run.start))
                 is_scattered[rows] = False
-            else:  # offsets are written first, and replaced by the numbers below
+            else:  # The offsets are written to the array first, and replaced by the numbers below.
                 np.add(
                     _compute_starts(run, 0, run.repeats),
                     offsets,
@@ -165,7 +166,7 @@ class Blocks(Database):
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Use the last state of a truncated file if it has these numbers and a line after them."""
+        """Use the incomplete last block of a file as a state if it has these numbers and a line after them."""
         if self.rest is None:
             return
         offsets = [
@@ -211,13 +212,13 @@ class Blocks(Database):
     def _read(
         self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
     ) -> None:
-        """Read the numbers of many equal blocks, reuse copied numbers, and read constant numbers only once."""
+        """Read the numbers of many equal blocks; reuse copied numbers, and read constant numbers only once."""
         varied_before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = varied_before[offsets + self._grammar.width] > varied_before[offsets]
         still = self._decoded(run.start + offsets[~moves])
         if still.view(np.int64).any():
             values[:, ~moves] = still
-        # a slice makes no copy, unlike an index array
+        # A slice makes no copy, unlike an index array.
         moving = slice(None) if moves.all() else np.flatnonzero(moves)
         step = max(1, self.batch // max(1, offsets[moving].size))
         for begin in range(0, run.repeats if moves.any() else 0, step):
@@ -231,7 +232,7 @@ class Blocks(Database):
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
-        """Return the numbers at these offsets, NaN for a field that is not a number."""
+        """Return the numbers at these offsets; a field that is not a number gives NaN."""
         fields = self._data.fields(addresses, self._grammar.width)
         return parse_fortran_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
@@ -262,7 +263,7 @@ class Blocks(Database):
         raise AssertionError("the file has this state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
-        """Return the offsets of the named numbers in a sequence of blocks; raise FormatError if one is ambiguous."""
+        """Return the offsets of the named numbers in equal blocks; raise FormatError if one of them is ambiguous."""
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
@@ -273,7 +274,7 @@ class Blocks(Database):
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
 
-    # Methods that find the blocks.
+    # The methods below find the blocks of the file.
 
     def _walk(self) -> None:
         """Find all sequences of blocks; leave out incomplete blocks."""
@@ -313,7 +314,7 @@ class Blocks(Database):
         return previous.last in layout.fields
 
     def _leave_out(self, block: Stretch, is_last: bool) -> None:
-        """Leave out an incomplete block, with a note."""
+        """Leave out an incomplete block, and add a note about it."""
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a restart segment of the run"
@@ -324,7 +325,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return the example, stride and number of blocks that have a recent layout; None for another layout."""
+        """Return example, stride and count of the blocks at ``position`` with a recent layout; None without one."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -336,7 +337,7 @@ class Blocks(Database):
     def _new(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int]:
-        """Parse a block with a new layout; return an example state, the bytes per state and the number of states."""
+        """Parse a block with a new layout; return an example block, its length, and the number of similar blocks."""
         following = self._find(position + 1)
         if following is None:
             last = Stretch(position, self._end - position, 1, position)
@@ -349,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the recent example that the last block of the file resembles, or the block itself."""
+        """Return the recent example block that the last block of the file resembles, or the last block itself."""
         alike = (
             example
             for example, stride in recent
@@ -383,7 +384,7 @@ class Blocks(Database):
         return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
-        """Count the blocks that resemble the example; store their varying bits, and copy the numbers needed first."""
+        """Count the blocks that resemble their example; store their varying bits, and copy the numbers needed first."""
         varied = np.zeros_like(literal)
         fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
@@ -412,7 +413,7 @@ class Blocks(Database):
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Return True if all blocks have the characters of their examples from the first anchor to the last number.
+        """Return True if all blocks equal their examples from the first anchor to the last requested number.
 
         Return False unchecked if that is most of a block: comparing whole blocks costs no more.
         """
@@ -423,14 +424,13 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Do the same as `_alike` for the blocks of one sequence, which have one example."""
+        """Return True if all blocks of one sequence equal their example, as `_alike` does for all sequences."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        end = (
-            int(offsets.max()) + self._grammar.width + 1
-        )  # the character after the number is compared too
+        # The character after the last number is compared too.
+        end = int(offsets.max()) + self._grammar.width + 1
         text = layout.literal[first:end]
         return (
             2 * text.size <= run.stride

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Part of the internal energy that is read in advance, because it is used whenever it exists.
+# Line with a part of the internal energy; it is read in advance, because it is always used.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # number of bytes that contain the header and the first state
+_NEAR: Final = 4096  # number of bytes at the start of a file that contain the header and the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 # The last line of a state in every known glstat; mass scaling may add lines after it.
@@ -43,7 +43,7 @@ _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTI
 # Pattern of a value. Each rigid wall has a separate line, with the number of the wall after the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
-# Pattern of variable text in other lines: numbers, and the element that controls the time step.
+# Pattern of the variable text in other lines: numbers, and the element that controls the time step.
 _CHANGING: Final = re.compile(
     rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
 )
@@ -59,7 +59,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run; the selection names the lines that its last state must have."""
+    """Open each file as a restart segment of the run; an incomplete last state must have the selected lines."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -83,7 +83,7 @@ class Glstat(Blocks):
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        # a missing line is reported when its values are requested
+        # A missing line is reported when its values are requested.
         with suppress(FormatError):
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
@@ -95,7 +95,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # becomes False if a state lacks a line that other states have
+        # False if a state lacks a line that other states have.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -104,7 +104,7 @@ class Glstat(Blocks):
         """Return the values of the line ``name``, shape (n,); raise FormatError unless every state has it once."""
         if name not in self._columns:
             wanted = [name]
-            # a request for another line is usually followed by more requests
+            # A request for another line is usually followed by more requests.
             if self._even:
                 names = dict.fromkeys((*self.channels, name))
                 wanted = [label for label in names if label not in self._columns]
@@ -114,7 +114,7 @@ class Glstat(Blocks):
     def _pass_over(
         self, names: list[str], needed_names: list[str]
     ) -> dict[str, Samples]:
-        """Read lines in one pass; if a state lacks one, read only the required ones."""
+        """Read lines in one pass; if a state lacks one of them, read only the required lines."""
         try:
             columns = self.numbers(names)
         except FormatError:
@@ -138,11 +138,11 @@ class Glstat(Blocks):
 def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
-    """Return the offsets of a block's values by label, and the last label; UNSURE for a truncated value."""
+    """Return the offsets of a block's values by label, and its last label; a truncated value has the offset UNSURE."""
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
-        # a truncated line within the block may belong to another state
+        # A truncated line within the block may belong to another state.
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()
@@ -155,7 +155,7 @@ def _describe_glstat_block(
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
         is_mixed |= name in fields
         fields[name] = line.start(2)
-    if is_mixed:  # any line of the block may belong to another state
+    if is_mixed:  # Any line of the block may belong to another state.
         fields = {
             name: offset if name == _TIME else UNSURE for name, offset in fields.items()
         }
@@ -181,7 +181,7 @@ _GRAMMAR: Final = Grammar(
 
 
 def write(title: str, lines: Mapping[str, Samples]) -> bytes:
-    """Return a glstat: blocks of ``label....... value``, six significant digits (E14.5), ``time`` first, all (n,)."""
+    """Write a glstat: blocks of ``label....... value`` with six significant digits, ``time`` first; all (n,)."""
     states = zip(*(values.tolist() for values in lines.values()), strict=True)
     blocks = (
         f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"

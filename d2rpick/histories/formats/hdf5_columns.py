@@ -28,17 +28,17 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-# names of groups without histories: index trees of PyTables, references of MATLAB
+# Starts of the names of groups without histories: index trees of PyTables, references of MATLAB.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-_WIDEST: Final = 64  # largest number of columns of a table of histories without names
+_WIDEST: Final = 64  # largest number of columns of a table without column names that is read as histories
 
-# Datasets below this share of the file are copied, because a view would keep the whole file in memory.
+# Largest share of the file for which a dataset is copied; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
 class Column(NamedTuple):
-    """One column: the ``path`` by which a user names it, and its position in the file.
+    """One column of an HDF5 file: the ``path`` by which a user names it, and its position in the file.
 
     ``field`` is the member of a compound dataset, ``place`` the (axis, index) of the column in a matrix.
     """
@@ -57,7 +57,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the column has the name of a time; for ``time/value`` the name is ``time``."""
+        """True if the name of the column means a time; for ``time/value`` the name is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -65,11 +65,11 @@ class Column(NamedTuple):
 
     @property
     def is_whole_number(self) -> bool:
-        """True if its values are integers, such as part ids."""
+        """True if the values of the column are integers, such as part ids."""
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Return its values, shape (size,), from the ``content`` of a file; raise FormatError if one is not finite."""
+        """Return the values of the column, shape (size,), from the file's ``content``; all must be finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -88,7 +88,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if data of a dataset are missing (they would read as zeros) or their type is damaged."""
+    """Raise FormatError if data of a dataset are missing, which h5py reads as zeros, or if their type is damaged."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
@@ -156,9 +156,8 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; a contiguous one that fills most of the file is a view of ``content``."""
-    start = (
-        dataset.id.get_offset()
-    )  # data in chunks or in other files have no offset in this file
+    # Data in chunks or in other files have no offset in this file.
+    start = dataset.id.get_offset()
     if start is None:
         return dataset[()]
     if not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
@@ -184,9 +183,8 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    read_groups: list[
-        str
-    ] = []  # groups whose layout has a reader of its own, which reads them completely
+    # Groups whose layout has its own reader, which reads them completely.
+    read_groups: list[str] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if any(step.startswith(_BOOKKEEPING) for step in name.split("/")):
@@ -239,7 +237,7 @@ def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Yield the columns of a matrix along the axis whose length is the number of titles, or the shorter axis."""
+    """Yield the columns of a matrix along the axis that has one title for each column, or else the shorter axis."""
     rows, width = dataset.shape
     if rows == width:
         return
@@ -275,9 +273,8 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[
-        0
-    ]  # path of the variable without the zone
+    # Path of the variable without the zone.
+    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
     numbers = [] if entities is None else np.ravel(entities[()]).tolist()
@@ -316,7 +313,7 @@ def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
 def _list_compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
-    """Yield a column for each member, several for a vector, whose names pandas stores in an attribute."""
+    """Yield a column for each member of a compound type, or for each component; pandas names them in an attribute."""
     if len(dataset.shape) != 1:
         return
     base = name.removesuffix("/table")
@@ -383,7 +380,7 @@ def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
     """Yield the index of a frame or series, if it consists of numbers."""
     title = _read_attribute_text(index.attrs.get("name"))
-    # "N." is the pickled form of None
+    # "N." is the pickled form of None.
     title = "index" if title in ("", "N.") else title
     if index.dtype.kind in "iuf" and index.ndim == 1:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])

@@ -57,26 +57,26 @@ _DAMAGED: Final = (
 # Offset of the end-of-file address in superblocks of version 0 to 3. All writers use 8-byte addresses.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# Time-out of a read: 60 s plus 1 s per 100 kB. A longer read means a cyclic B-tree in a damaged file.
+# Time-out of a read, in addition to 1 s per 100 kB [s]. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
 _SLOWEST: Final = 100_000  # slowest expected reading speed [bytes/s]
 _USER_BLOCK: Final = 512  # number of bytes that MATLAB puts before the file
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data`` is the start of an HDF5 file; MATLAB puts 512 bytes before its signature."""
+    """Return True if ``data`` is the start of an HDF5 file; MATLAB puts 512 bytes before the signature."""
     return SIGNATURE in (data[:8], data[512:520])
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a leg of the run; selected columns take precedence over those of a saved binout."""
+    """Open each file as a restart segment. Selected columns take precedence over branches of a saved binout."""
     return [_open_leg(source, selection) for source in sources]
 
 
 def _open_leg(source: Source, selection: Selection) -> Database:
-    """Open one file as a saved binout or as columns."""
+    """Open one file as a saved binout or as a file of columns."""
     _import_library(source.name)
-    # The file is read into memory: if it changes on disk, the library may crash on a mixture of two versions.
+    # The file is read into memory: if it changed on disk, the library could crash on a mixture of two versions.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
@@ -87,7 +87,7 @@ def _open_leg(source: Source, selection: Selection) -> Database:
 
 
 def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; {} for a file of another layout."""
+    """Open the glstat and matsum branches that lasso-python saved; return {} for a file of another layout."""
     with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
@@ -99,7 +99,7 @@ def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout by path; a `Database` without parts."""
+    """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -337,7 +337,7 @@ def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Col
 def _find_only_energy(
     columns: Sequence[Column], time: Column | None, source: str
 ) -> Column:
-    """Return the only column named like an internal energy, or the only one next to a time."""
+    """Return the only column whose name means an internal energy, or the only column besides a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:
@@ -406,7 +406,7 @@ def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         ) from error
 
 
-# Checks for damage that would make the library crash or loop endlessly.
+# The functions below find damage that would make the library crash or loop endlessly.
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
@@ -439,7 +439,7 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
-    """Raise FormatError if the size of a file differs from the one in its header."""
+    """Raise FormatError if the size of a file differs from the size in its header."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -450,7 +450,7 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
         or len(head) < offset + _ADDRESS_SIZE
         or head[_SIZE[version]] != _ADDRESS_SIZE
     ):
-        return  # the library reports the problem itself
+        return  # The library reports this problem itself.
     (end,) = struct.unpack_from("<Q", head, offset)
     if size not in (end, end + base):
         raise FormatError(
@@ -487,7 +487,7 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) ->
 
 
 def _read_all_data(file: BinaryIO, source: str) -> None:
-    """Read the description of all data, and data in chunks; raise FormatError beyond the limits."""
+    """Read the description of all data, and all data in chunks; raise FormatError if a limit is exceeded."""
     import h5py
 
     size = _head_and_size(file)[1]

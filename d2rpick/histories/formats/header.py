@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 _SHORT: Final = 60  # largest number of characters of a line that a message quotes
-# The first columns of OpenRadioss' th_to_csv in every version.
-# Some versions then write more or fewer names than columns (OpenRadioss/Tools, issue 98).
+# The first columns of OpenRadioss' th_to_csv in every version of this program.
+# In some versions, the number of names differs from the number of columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -41,7 +41,7 @@ _SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Names and units of the columns, if there are any; only the first ``sure`` columns have certain names."""
+    """Names and units of the columns, as far as the file has them; only the first ``sure`` names are certain."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ def read_header(
     title = ""
     if len(names) > 1 and not names[-1]:
         names = names[:-1]
-        # LS-PrePost writes a line of titles, then "Time," or "Time,A8874,"
+        # LS-PrePost writes a line of titles before the line "Time," or "Time,A8874,".
         if len(rows) > 1:
             title = next((cell for cell in reversed(rows[-2]) if cell), "")
     if columns == 2 and len(names) == 1 and is_time(names[0]):
@@ -92,7 +92,7 @@ def read_header(
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        # 3DEXPERIENCE: the third name is the name of the curve
+        # In files of 3DEXPERIENCE the third name is the name of the curve.
         title = " ".join(filter(None, names[2:]))
         sure = None
     return Header(tuple(names), units, title, sure)
@@ -105,7 +105,7 @@ def quote_start(line: str) -> str:
 
 
 def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
-    """Return the number of columns whose names are certain (None: all); raise FormatError if none is certain."""
+    """Return the number of columns whose names are certain (None: all); raise FormatError if no name is certain."""
     if len(names) == columns:
         return None
     if tuple(map(normalise_name, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
@@ -119,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names, from the last one upwards, until all names differ; [] if one row is enough.
+    """Join rows of names, from the last row upwards, until all names differ; return [] if one row is enough.
 
     Examples
     --------
@@ -142,19 +142,19 @@ def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str
 
 
 def _join_names(upper: str, lower: str) -> str:
-    """Join the names of a column from two rows; the name of a time is not joined."""
+    """Join the names of a column from two rows, unless the column is the time."""
     return lower if is_time(lower) else f"{upper} {lower}".strip()
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return one cell per column, without empty cells after them; [] if there are too few or too many names."""
+    """Return one name per column, without empty cells after them; [] if there are too few or too many names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat a name, except the time's, in the empty cells after it, which a spreadsheet had merged with it."""
+    """Repeat each name in the empty cells after it, which a spreadsheet had merged with it; do not repeat a time."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -164,7 +164,7 @@ def _fill_from_left(cells: Sequence[str]) -> list[str]:
 def _split_rows(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> Iterator[list[str]]:
-    """Yield the cells of each header line; a quoted name may extend over a line end."""
+    """Yield the cells of each header line; a quoted name may contain a line end."""
     pending = ""
     for line in lines:
         if not pending and is_skipped(line):
@@ -178,7 +178,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Split a header line. Names between blanks may contain single blanks; a line that does not fit is one title."""
+    """Split a header line into names, which may contain single blanks; a line that does not fit is one title."""
     if separator is not None:
         return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -191,7 +191,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Return the names in the last comment line if they name each column and a time, as in numpy.savetxt files."""
+    """Return the names in the last comment line, as numpy.savetxt writes it, if they name each column and a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

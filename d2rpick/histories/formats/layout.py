@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-# Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
-# If both are a comma, rows can be read only if the numbers are in quotes.
-# text at the beginning of a d3hsp and a messag
+# Text at the beginning of a d3hsp and of a messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
+# Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
+# If both signs are a comma, rows can be read only if their numbers are in quotes.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
 )
 
-# The line ``sep=;`` above a table, as spreadsheets write it; the separator must not belong to a number.
+# Pattern of the line ``sep=;`` that spreadsheets write above a table; the separator is no part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Numbers of lines in which the first row is searched for: more than most headers have, then more than any has.
+# Numbers of lines that are searched for the first row, in up to three attempts.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -83,11 +83,11 @@ class Layout(NamedTuple):
         return name or f"column {column + 1}"
 
     def channel(self, column: int) -> str:
-        """Return the name of a column, with the title of its curve if there is one."""
+        """Return the name of a column, after the title of its curve if there is one."""
         return f"{self.name(column)}: {self.title}" if self.title else self.name(column)
 
     def unit(self, column: int) -> str:
-        """Return the unit of a column as the file names it, or an empty string."""
+        """Return the unit of a column in the file, or an empty string if the file has none."""
         if self.units:
             return self.units[column].strip("()[]")
         return find_unit(self.names[column]) if self.names else ""
@@ -109,7 +109,7 @@ def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
 
 
 def find_layout(text: Text) -> Layout:
-    """Find the layout of a table by its first lines. An unterminated last line is used only if it is the only row.
+    """Find the layout of a table in its first lines. An unterminated last line is used only if it is the only row.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator that the cells of ``rows`` prove, if some cells are not numbers without it."""
+    """Add the thousands separator that ``rows`` prove, if some of their cells are not numbers without it."""
     odd = [
         cell
         for row in rows
@@ -157,7 +157,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
 
 
 def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
-    """Return the error for a text without a table; it quotes the first likely row, or the first line."""
+    """Return the error for a text without a table; the error quotes the first likely row, or the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
     ]
@@ -229,7 +229,7 @@ def _find_rows(
             counts = Counter(kind for _, _, kind in kinds)
             common, count = max(counts.items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            # in this case every row ends with a separator
+            # If the last cell of every row is empty, every row ends with a separator.
             is_closed = not any(row[-1] for _, row in alike)
             columns = len(common) - is_closed
             if columns > 1 and count > best_count:
@@ -243,15 +243,16 @@ def _find_rows(
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return, for each cell of a row, True if it is a number or missing; an empty tuple if the line is not a row."""
-    if len(cells) < 2:  # the usual case, caused by a wrong separator
+    """Return for each cell of a row if it is a number or missing; an empty tuple if the line is not a row."""
+    # Most lines have only one cell, because most separators that are tried are wrong.
+    if len(cells) < 2:
         return ()
     written = [form.number(cell) is not None for cell in cells]
     numbers = tuple(
         number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
     )
     words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
-    # "| a title |" is not a row
+    # A line such as "| a title |" is not a row.
     is_row = (
         any(written)
         and sum(numbers) > 1
@@ -271,7 +272,7 @@ def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
 def _refuse_odd_rows(
     source: str, lines: Sequence[str], first: int, table: Layout
 ) -> None:
-    """Raise FormatError if a line above the rows begins with a number: it is a different row, not a header."""
+    """Raise FormatError if a line above the rows begins with a number, because this line is not a header."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:

@@ -52,20 +52,20 @@ _TYPES: Final = {
     10: "f8",
 }
 
-# Number of bytes that contain the header, type and name of a variable; more bytes are read at once.
+# Number of bytes that contain the header, type and name of a variable.
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# Number of repetitions from which comparing arrays is faster than reading the records.
+# Smallest number of repetitions for which comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
-# Names of state directories: d and the number of the state, with 6 to 18 digits (which fit an int64).
+# Pattern of the names of state directories: d and the number of the state (18 digits fit an int64).
 _STATE: Final = re.compile(rb"(?:^|/)d(\d{1,18})$")
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a directory: its values begin ``offset`` bytes after the start of the directory."""
+    """A variable of a directory; its values begin ``offset`` bytes after the start of the directory."""
 
     offset: int
     dtype: np.dtype[Any]
@@ -80,7 +80,7 @@ class DirectoryLayout(NamedTuple):
 
 
 class _Form(NamedTuple):
-    """The bytes of a directory's records as one integer, which is quick to compare with another directory.
+    """The records of a directory as one integer, which is quick to compare with another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -93,7 +93,7 @@ class _Form(NamedTuple):
 
 
 class _Directory(NamedTuple):
-    """A directory while its records are read: they start at the byte ``start``.
+    """A directory while its records are read; the records begin at the byte ``start``.
 
     ``number`` is that of the state, -1 if the directory is no state.
     """
@@ -104,12 +104,12 @@ class _Directory(NamedTuple):
 
     @property
     def is_state(self) -> bool:
-        """True if the directory holds the values of a state."""
+        """True if the directory contains the values of a state."""
         return self.number >= 0
 
     @property
     def branch(self) -> str:
-        """Path of the directory above."""
+        """Path of the parent directory."""
         return "/".join(self.path[:-1])
 
 
@@ -175,11 +175,11 @@ class Lsda:
         return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Return the number, start and layout of each visit to a state of a branch, shape (n, 3)."""
+        """Return the number, start and layout of each state of a branch in the order of the file, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
-        """Return where a later read can begin: at the earliest second-to-last state of any branch.
+        """Return where a later read can begin: at the earliest of the second-to-last states of all branches.
 
         The head repeats the metadata of all wanted branches, each behind a change to its directory.
         """
@@ -216,16 +216,17 @@ class Lsda:
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        """Read the records from a byte offset on, and collect the directories of the wanted branches."""
+        """Read the records from a byte offset on, and collect the directories of the requested branches."""
         data = self.data
         unpack = self._head.unpack_from
         head = self._head.size
         size, name_length = len(data), head + self._type.size
-        near, base = b"", 0  # the bytes around the current position
+        # Bytes around the current position, and the position of the first of them.
+        near, base = b"", 0
         directory = _Directory((), -1, position)
         records = list[bytes]()
         command = 0
-        # start of the last state of each branch
+        # Start of the last state of each branch.
         anchors: dict[tuple[str, ...], int] = {}
         heads: set[bytes] = set()
         while position + head <= size:
@@ -266,18 +267,16 @@ class Lsda:
             else:
                 records.append(near[at : at + head])
             position = end
-        if position < size and not self._goes_on(
-            data[position : position + head], heads
-        ):
-            records = records[:-1]
-        self._leave(directory, records)
         if position < size:
             self.stop = f"no complete record at byte {position} of {size}"
+            if not self._goes_on(data[position : position + head], heads):
+                records = records[:-1]
+        self._leave(directory, records)
         if directory.is_state and (self.stop or command == VARIABLE):
             self.unfinished = directory.branch
 
     def _enter(self, path: tuple[str, ...], begin: int, end: int) -> _Directory | None:
-        """Return the directory that a record enters from ``path``; None if the bytes of the record are no name."""
+        """Return the directory that a record enters from ``path``; None if the record contains no valid name."""
         text = self.data[begin:end]
         if not text.isascii() or not text.decode().isprintable():
             return None
@@ -296,9 +295,9 @@ class Lsda:
         return command in _TABLES and length < _LONGEST
 
     def _leave(self, directory: _Directory, records: list[bytes]) -> None:
-        """Store the variables of the directory that ends here, if they are wanted."""
+        """Store the variables of the directory that ends here, if the directory is requested."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
-            records.pop()  # a symbol table after the variables is not part of the layout
+            records.pop()  # A symbol table after the variables is not part of the layout.
         branch = directory.branch
         if not records or branch not in self.visits:
             return
@@ -339,7 +338,7 @@ class Lsda:
         return DirectoryLayout(variables, frozenset(doubled))
 
     def _form(self, heads: tuple[bytes, ...]) -> _Form:
-        """Return the form of a directory with these record headers."""
+        """Return the form of a directory whose records have these headers."""
         mask, fixed = bytearray(), bytearray()
         for head in heads:
             values = bytes(self._head.unpack_from(head)[0] - len(head))
@@ -348,7 +347,7 @@ class Lsda:
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
     def _same_again(self, directory: _Directory) -> _Form | None:
-        """Return the form of the last state of the branch if this state has the same records, else None."""
+        """Return the form of the branch's last state if this state has the same records, else None."""
         if not directory.is_state or directory.branch not in self._forms:
             return None
         form = self._forms[directory.branch][1]
@@ -380,7 +379,7 @@ class Lsda:
         }
         ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
-            if not visits:  # the file lacks this branch
+            if not visits:  # The file lacks this branch.
                 continue
             last_visits = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = last_visits[np.isin(last_visits[:, 1], [*growth])]
@@ -392,7 +391,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Quickly compare records one stride apart; return True if a search for repetitions is worthwhile."""
+        """Compare records one stride apart; return True if it is worthwhile to search for repetitions."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]
@@ -402,7 +401,7 @@ class Lsda:
     def _pattern(
         self, begin: int, end: int
     ) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
-        """Return a mask of the structure bytes (255) between two offsets, and the positions of state numbers."""
+        """Return an array that is 255 for the bytes of record headers, and the positions of the state numbers."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
         block = self.data[begin:end]
@@ -459,7 +458,7 @@ def recognises(head: bytes) -> bool:
 
 
 def _resolve_path(path: tuple[str, ...], change: str) -> tuple[str, ...]:
-    """Return the path after a change of directory.
+    """Return the path after a change to another directory.
 
     Examples
     --------

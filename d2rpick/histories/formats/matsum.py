@@ -38,7 +38,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-# Quantities that are adjacent in the file.
+# Quantities that are adjacent in the file, so that they are read together.
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
@@ -48,10 +48,11 @@ _AXES: Final = (
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # text that begins the lines of a part
-# the part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy
+# The part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
-_UNREADABLE: Final = -1  # stands for a part number that is damaged or has overflowed
-# largest part number; larger numbers overflow their eight columns
+# placeholder for a part number that is damaged, or too long for its columns
+_UNREADABLE: Final = -1
+# Largest part number that fits into its eight columns.
 _WIDEST: Final = 99_999_999
 
 _LEGEND: Final = re.compile(
@@ -66,18 +67,17 @@ _LINE: Final = re.compile(
     re.MULTILINE,
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
-# A part number has 5 or, from 100000 on, 8 columns; a longer one shifts the rest of the line.
+# A part number has 5 columns, or 8 columns from 100000 on; a longer number shifts the rest of the line.
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-_CHANGING: Final = re.compile(
-    rb" {0,12}[+-]?\d[\d+-]*"
-)  # pattern of the numbers in lines that may vary between states
+# Pattern of the numbers in lines that may vary between states.
+_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the beginning of a file, looks like a matsum: with parts, or nothing after a legend."""
+    """Return True if ``data``, the start of a file, looks like a matsum; a legend without states is enough."""
     if b"\n mat.#=" in data:
         return b"\n" + _START in data
     _, legend, states = data.partition(b"\n{END LEGEND}")
@@ -85,7 +85,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
-    """Open each file as a leg of the run."""
+    """Open each file as a restart segment of the run."""
     return [Matsum(source.data, source.name) for source in sources]
 
 
@@ -147,7 +147,7 @@ class Matsum(Blocks):
             )
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._together:
-            # a request for one component is usually followed by requests for the other components
+            # A request for one component is usually followed by requests for the other components.
             together = _AXES if quantity in _AXES else (quantity,)
             names = [
                 (id_, QUANTITIES[component]) for id_ in ids for component in together
@@ -203,7 +203,7 @@ def _read_legend(data: bytes | Content) -> dict[int, str]:
 
 
 class PartColumns(NamedTuple):
-    """Histories of one part to be written, all of the same shape (n,)."""
+    """Energies and momenta of one part to be written, all of the same shape (n,)."""
 
     title: str
     internal_energy: Samples
@@ -213,7 +213,7 @@ class PartColumns(NamedTuple):
 
 
 def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
-    """Return a matsum of parts, numbered from 1, with five significant digits (13 columns, E13.4); ``time`` is (n,)."""
+    """Write a matsum of parts, numbered from 1, with five significant digits; ``time`` is (n,)."""
     legend = "".join(
         f"{number:9d}     {part.title:<70}\n"
         for number, part in enumerate(parts, start=1)
@@ -258,7 +258,7 @@ def _describe_matsum_block(
     lines: Sequence[re.Match[bytes]],
     literal: Bytes,
 ) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
-    """Return the offsets of the numbers of a block by part and name, and the last name; UNSURE if a number is cut."""
+    """Return the offsets of a block's numbers by part and name, and its last name; UNSURE for a truncated number."""
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
     doubled = False
@@ -267,9 +267,9 @@ def _describe_matsum_block(
         if line[1] is not None:
             part = _find_part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
-            if doubled:  # if a part has two groups of lines, neither is reliable
+            if doubled:  # If a part has two groups of lines, neither group is reliable.
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            # the offset includes the line end before the line
+            # The offset includes the line end before the line.
             fields[part, _MAT] = UNSURE if doubled else line.start() - 1
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _UNIT_SEPARATOR: Final = "\x1f"  # a control character that occurs in no table
-# Largest relative error of the fast pandas reader. It uses 17 digits, and counts leading zeros as digits.
+# Largest relative error of the fast number parser of pandas, which counts leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
 
@@ -42,10 +42,10 @@ def read_plain_rows(
     separator_bytes = (layout.separator or "\n").encode("latin-1")
     closed = piece[: piece.index(b"\n")].endswith(separator_bytes)
     if layout.separator and (closed or sorted(used) != read_columns):
-        # otherwise the parser checks that each row has its cells
+        # In all other cases the parser checks that each row has its cells.
         if not _has_all_cells(piece, layout):
             return None
-        # the first column is read too, because it would show a comment
+        # The first column is read too, because it shows comments.
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
@@ -54,17 +54,17 @@ def read_plain_rows(
         table = read_table(piece, layout, chosen)
     except ValueError:
         return None
-    # bytes.count() is slow if the lines are short
+    # bytes.count() is slow if the lines are short.
     lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
     if table.shape != (lines, len(read_columns)):
-        return None  # the parser skipped blank lines
+        return None  # The parser skipped blank lines.
     if read_columns == [*used]:
         return table
     return table[:, np.searchsorted(read_columns, used)]
 
 
 def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
-    """Replace the separators of rows with all cells in quotes by a control character; return None for other rows."""
+    """Replace the separators of rows with only quoted cells by a control character; return None for other rows."""
     if layout.separator is None:
         return None
     between = f'"{layout.separator}"'.encode("latin-1")
@@ -81,10 +81,10 @@ def _read_with_numpy(
     piece: bytes, layout: Layout, columns: Sequence[int] | None
 ) -> Samples:
     """Read rows of numbers with numpy, in the given columns or all columns; raise ValueError for other rows."""
-    # numbers contain no character outside Latin-1
+    # Numbers contain no character outside Latin-1.
     lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
-        # numpy skips blank lines, and warns if there are no other lines
+        # numpy skips blank lines, and warns if there are no other lines.
         raise ValueError
     return np.loadtxt(
         lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns
@@ -108,7 +108,7 @@ def _read_with_pandas(
         "quoting": QUOTE_NONE,
     }
     options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
-    # From pandas 3.1 on the default is exact, as `float` is.
+    # From pandas 3.1 on, the default parser is as exact as `float`.
     if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:
         if columns is None and layout.separator:
             fast = pd.read_csv(
@@ -117,14 +117,14 @@ def _read_with_pandas(
             exact = read_exact_numbers(piece, layout.separator, fast)
             if exact is not None:
                 return exact
-        # the exact reader takes three times as long
+        # The exact parser takes three times as long.
         options["float_precision"] = "round_trip"
     table: Samples = pd.read_csv(BytesIO(piece), sep=separator, **options).to_numpy()
     return table
 
 
 def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
-    """Parse rows of numbers exactly with scipy; None if scipy fails or disagrees with the fast result ``fast``.
+    """Parse rows of numbers exactly with scipy; return None if scipy fails or disagrees with the fast result ``fast``.
 
     Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
     result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
@@ -140,13 +140,13 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # numbers that are not finite never agree
+    with np.errstate(invalid="ignore"):  # Numbers that are not finite never agree.
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 
 
 def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Return True if all rows have their number of cells and either all or none end with a separator."""
+    """Return True if all rows have the right number of cells and either all or none end with a separator."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     ends = signs == ord("\n")

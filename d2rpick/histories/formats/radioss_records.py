@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-# size of a binary number, and of the record length before and after each record [bytes]
+# Size of a binary number, and of the record length before and after each record [bytes].
 WIDTH: Final = 4
 RUN: Final = 84  # size of the first record [bytes]: a code and a title of 80 bytes
 
@@ -33,17 +33,17 @@ _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
 _LONG, _SHORT = 10, 5  # number of columns of an integer in the two text formats
-# Fortran prints this in place of a number that is too long
+# Fortran prints these characters in place of a number that is too long.
 _STARS: Final = b"*" * _SHORT
-# upper limit for the length of a header record without its integers [bytes]
+# Upper limit for the length of a header record without its integers [bytes].
 _ROOM: Final = 1024
-# number of characters of the run title in text files (80 in binary files)
+# Number of characters of the run title in text files (80 in binary files).
 _RUN_TITLE: Final = 72
-# number of columns of a real number, whose decimal point is in the fourth column
+# Number of columns of a real number; the decimal point is in the fourth column.
 _REAL: Final = 16
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
-# number of times at the end of a file from which the precision is determined
+# Number of times at the end of a file from which the precision is determined.
 _JUDGED: Final = 100
 
 
@@ -76,7 +76,7 @@ def open_records(data: Content, source: str) -> Records:
 
 
 class Records:
-    """The layout of the records in a binary file; ``at`` is the byte of the next header record."""
+    """The layout of the records in a binary file; ``at`` is the offset of the next header record."""
 
     width = WIDTH  # size of a number in a state [bytes]
 
@@ -106,17 +106,17 @@ class Records:
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return the offsets and bytes of the marks in every record with ``count`` reals; all have the same length."""
+        """Return offset and bytes of the length marks in every record with ``count`` reals."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
-        """Decode bytes of shape (n, width) as reals of shape (n,); NaN where the bytes are not a number."""
-        # a NaN is refused later, unless the value is not used
+        """Decode bytes of shape (n, width) as reals of shape (n,); NaN for bytes that are not a number."""
+        # A NaN is refused later, unless the value is not used.
         with np.errstate(invalid="ignore"):
             return fields.view(">f4").ravel().astype(np.float64)
 
-    def digits(self, times: Samples) -> int:  # noqa: ARG002
+    def digits(self, times: Samples) -> int:  # noqa: ARG002  the subclass uses the argument
         """Return the significant decimal digits of the reals."""
         return DIGITS[WIDTH]
 
@@ -137,21 +137,21 @@ class _TextRecords(Records):
             return None
         first, characters, last = (int(count or 0) for count in shape.group(1, 2, 3))
         begin = self.at + len(line) + len(self._line_end)
-        # the body ends at the next mark, since a title may contain line ends
+        # The body ends at the next mark, because a title may contain line ends.
         room = self._data[begin : begin + _ROOM + (_LONG + 1) * first]
         body, mark, _ = room.partition(self._line_end + _MARK)
         if not mark and not body.endswith(self._line_end):
             return None
         body = body.removesuffix(b"" if mark else self._line_end)
         self.at = begin + len(body) + len(self._line_end)
-        if shape[4] == b"R":  # the conversion factors of the units are not used
+        if shape[4] == b"R":  # The conversion factors of the units are not used.
             return bytes(WIDTH * last)
         return self._packed(body.removesuffix(self._name), first, characters, last)
 
     def _packed(
         self, body: bytes, first: int, characters: int, last: int
     ) -> bytes | None:
-        """Return a record in binary form; None if its content differs from its first line."""
+        """Return a record of a text file in binary form; None if its content does not match its first line."""
         if not characters:
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
@@ -187,12 +187,12 @@ class _TextRecords(Records):
 
     def values(self, fields: Bytes) -> Samples:
         values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
-        # a number with shifted or missing characters often still reads as a number
+        # A number with shifted or missing characters can often still be parsed.
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
 
     def digits(self, times: Samples) -> int:
-        """Return the digits of single precision if all times are single-precision numbers, as the solver then used."""
+        """Return the digits of single precision if all times are single-precision numbers, else of the text."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()
@@ -211,7 +211,7 @@ def split_integers(record: bytes) -> tuple[int, ...]:
 
 
 def _pack_integers(text: bytes, count: int, width: int) -> bytes:
-    """Pack ``count`` integers of ``width`` columns. Stars stand for a material or property id and become 1, not 0."""
+    """Pack ``count`` integers of ``width`` columns. Asterisks replace a material or property id and become 1, not 0."""
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))

@@ -1,4 +1,4 @@
-"""Read time histories of Radioss and OpenRadioss, T01, T02, ... (one per leg of a run), binary or text.
+"""Read time histories of Radioss and OpenRadioss (T01, T02, ..., one per engine run), binary or text.
 
 The head names the run, gives the numbers of parts, materials, properties, subsets, groups and global variables, and
 describes each of them. Each state is a record with the time, and one record each for the global variables, the parts,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
-# possible lengths [bytes] of titles other than the run title, from older to newer formats
+# Possible lengths of all titles but the run title, from older to newer formats [bytes].
 _TITLES: Final = (
     40,
     80,
@@ -54,7 +54,7 @@ _GLOBALS: Final = (
     "added_mass", "percentage_added_mass", "inlet_mass", "outlet_mass", "inlet_energy", "outlet_energy",
 )  # fmt: skip
 
-# Part variables that are used, by their code in the file.
+# Part variables that d2rpick uses, by their code in the file.
 _PART_VARIABLES: Final = {
     1: "internal_energy", 2: "kinetic_energy", 3: "x_momentum", 4: "y_momentum", 5: "z_momentum", 6: "mass",
     7: "hourglass_energy", 9: "x_center", 10: "y_center", 11: "z_center", 21: "rotational_internal_energy",
@@ -62,10 +62,10 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-# The kind of a group of nodes, and the variable codes of the displacements.
+# Kind of a group of nodes, whose displacements have the variable codes below.
 _NODES: Final = 0
 _DISPLACEMENTS: Final = (1, 2, 3)
-# Kinds of groups that have forces, and the variable codes of the normal and tangential impulses.
+# Kinds of groups with contact forces, whose normal and tangential impulses have the variable codes below.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
@@ -88,16 +88,16 @@ class _Group(NamedTuple):
 
 
 class _Head(NamedTuple):
-    """The header: the content of the records before the first state."""
+    """The header of the file: the content of the records before the first state."""
 
     title: str
     version: str
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
-    # index of a part's variable among the variables of all parts
+    # Index of a part's variable among the variables of all parts.
     columns: dict[tuple[int, str], int]
-    counts: tuple[int, ...]  # numbers in the records of one state
-    groups: tuple[_Group, ...]  # groups, whose records end each state
+    counts: tuple[int, ...]  # number of values in each record of a state
+    groups: tuple[_Group, ...]  # groups with histories, whose records end each state
 
 
 def recognises(head: bytes) -> bool:
@@ -112,7 +112,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
-    """Open each file as a leg of the run.
+    """Open each file as a restart segment of the run.
 
     A time history with its own output interval (T01a, by /ATFILE) has no global values and is no leg next to other
     files.
@@ -152,7 +152,7 @@ class TimeHistory(Database):
         self._records = open_records(self._data, source)
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
-        # only parts named by a /TH/PART card have variables
+        # Only the parts on a /TH/PART card have variables.
         parts_with_variables = {id_ for id_, _ in head.columns}
         self.parts = tuple(
             part for part in head.parts if part.id in parts_with_variables
@@ -165,7 +165,7 @@ class TimeHistory(Database):
         self.notes = (*stop, *self._silent_parts())
 
     @cached_property
-    def digits(self) -> int:  # type: ignore[override]
+    def digits(self) -> int:  # type: ignore[override]  # a property overrides a field
         """Significant decimal digits of all numbers."""
         return self._records.digits(self.time)
 
@@ -193,7 +193,7 @@ class TimeHistory(Database):
         )
 
     @cached_property
-    def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]
+    def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]  # a property overrides a field
         """Numbers of the nodes with written displacements (card /TH/NODE)."""
         return tuple(self._displacement_columns)
 
@@ -205,7 +205,7 @@ class TimeHistory(Database):
 
     @cached_property
     def _displacement_columns(self) -> dict[int, tuple[int, list[int]]]:
-        """The record with the displacements of each node, and their three columns in it."""
+        """For each node: the index of the record with its displacements, and their three columns in the record."""
         places: dict[int, tuple[int, list[int]]] = {}
         for record, group in self._list_groups():
             if group.kind == _NODES and {*_DISPLACEMENTS} <= {*group.variables}:
@@ -216,7 +216,7 @@ class TimeHistory(Database):
         return places
 
     def _list_groups(self) -> Iterator[tuple[int, _Group]]:
-        """Yield the groups with values, each with the index of its record."""
+        """Yield the groups that have values, each with the index of its record."""
         groups = [group for group in self._head.groups if group.values]
         return enumerate(groups, start=len(self._begins) - len(groups))
 
@@ -256,7 +256,7 @@ class TimeHistory(Database):
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:
-        """Return the index of a part's variable in the record of the parts; raise FormatError if there is none."""
+        """Return the index of a part's variable in the record of the parts; raise FormatError if it is missing."""
         column = self._head.columns.get((id_, quantity))
         if column is None:
             quantities = [name for part, name in self._head.columns if part == id_]
@@ -280,14 +280,14 @@ class TimeHistory(Database):
         return self._records.values(fields).reshape(self._states, len(columns))
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
-        """Return the byte offsets of the numbers in each of the first ``states`` states, shape (states * offsets,)."""
+        """Return the offsets [byte] of the numbers in the first ``states`` states, shape (states * offsets,)."""
         return np.add.outer(
             self._records.at + self._stride * np.arange(states),
             np.array(offsets, np.int64),
         ).ravel()
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
-        """Count the complete states; a truncated state may follow, but nothing else between states.
+        """Count the complete states; only the last state may be truncated.
 
         Records have neither name nor number: if one is lost or inserted, no state of the file can be trusted.
         """
@@ -325,13 +325,13 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """Reads the records of the header one after the other."""
+    """Reads the records of the header of a time history one after the other."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        # length of the titles [bytes], the same in all records; 0 until the first title is read
+        # Length of the titles [bytes], the same in all records; 0 until the first title is read.
         self._title = 0
 
     def head(self) -> _Head:
@@ -339,7 +339,7 @@ class _HeadRecords:
         run = self._next(RUN)
         version = clean_text(self._next(80))
         hierarchy = self._next()
-        # newer releases write a record that contains the number of additional records
+        # Newer releases write a record with the number of additional records.
         if len(hierarchy) == WIDTH:
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
@@ -379,7 +379,7 @@ class _HeadRecords:
     def _parts(
         self, count: int
     ) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
-        """Read the parts: id, title, subset, material, property and number of variables; then the variables."""
+        """Read the parts: id, title, subset, material, property and number of variables; then read the variables."""
         described: dict[int, Part] = {}
         columns: dict[tuple[int, str], int] = {}
         values = 0
@@ -388,9 +388,9 @@ class _HeadRecords:
             id_ = INT.unpack_from(record)[0]
             material, properties, variables = split_integers(record[-3 * WIDTH :])
             codes = self._integers(self._count(variables))
-            # An element group with a history is listed like a part, but without material and property.
+            # An element group with a history is listed like a part, but has no material and no property.
             if material or properties:
-                # a solver may write 0 for every variable
+                # A solver may write 0 for every variable.
                 nonzero_codes = [code for code in codes if code]
                 is_repeated = len(set(nonzero_codes)) < len(nonzero_codes)
                 if id_ in described or is_repeated:
@@ -429,7 +429,7 @@ class _HeadRecords:
         return _Group(kind, elements, names, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:
-        """Read a record of a title and this number of integers."""
+        """Read a record that contains a title and this number of integers."""
         record = self._next(WIDTH * numbers + self._title if self._title else None)
         self._title = len(record) - WIDTH * numbers
         if self._title not in _TITLES:
@@ -437,7 +437,7 @@ class _HeadRecords:
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read a record of ``count`` integers; for 0 the file has no record."""
+        """Read a record of ``count`` integers; if ``count`` is 0, the file has no such record."""
         return split_integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:

@@ -57,7 +57,7 @@ def read_columns(
 def find_line(
     text: Text, begin: int, layout: Layout, time_column: int, state: int
 ) -> int:
-    """Return the number of the line that contains a state; states and lines are counted from 0 and 1."""
+    """Return the number of the line that contains a state; states are counted from 0, lines from 1."""
     for numbers, _ in _read_tables(
         text, begin, _Curve(text.name, layout, [time_column])
     ):
@@ -70,7 +70,7 @@ def find_line(
 def _read_tables(
     text: Text, begin: int, curve: _Curve
 ) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Yield line numbers and values (rows, used) of each piece; read line by line only if rows differ."""
+    """Yield line numbers and values (rows, used) of each piece; rows that differ in form are read line by line."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = read_plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
@@ -93,7 +93,7 @@ def _read_tables(
 
 
 class _Below(NamedTuple):
-    """The first line below the table that is not a row: its number and text, and its error if rows follow it."""
+    """The first line below the table that is no row: its number and text, and the error to raise if rows follow."""
 
     line: int
     text: str
@@ -101,23 +101,22 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """State of the reader of a table: the last time, gaps, and lines found below the table."""
+    """State of the reader of a table: the states read so far, and the lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
         self._name = name
-        self._before: float | None = None  # time of the last state
+        self._before: float | None = None  # Time of the last state.
         self._gap = self._ended = False
-        self._read: list[
-            Samples
-        ] = []  # states of the earlier pieces, an array for each
-        # states read from the current piece so far
+        # States of the earlier pieces, an array for each piece.
+        self._read: list[Samples] = []
+        # States read from the current piece so far.
         self._current: list[list[float]] = []
         self._below: _Below | None = None
-        self._repeated = (
-            0  # number of states of the table that are repeated below the table
-        )
-        self._repeated_from = 0  # line number of the first repeated state
+        # Number of states of the table that are repeated below the table.
+        self._repeated = 0
+        # line number of the first repeated state below the table
+        self._repeated_from = 0
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -173,7 +172,7 @@ class _Curve:
                 yield number, state
 
     def _read_state(self, number: int, row: str) -> list[float] | None:
-        """Return the values of the used columns in a row; None if all are empty and a state precedes the row."""
+        """Return the values of the used columns in a row; None if all of them are empty in a row after the first."""
         where = f"{self._name}:{number}"
         cells = _split_row(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
@@ -184,7 +183,7 @@ class _Curve:
         ]
 
     def _is_below(self, row: str) -> bool:
-        """Return True if a line that is not a row begins with a word and has no time, as lines below a table do."""
+        """Return True if a line is no row, begins with a word and has no time, as lines below a table do."""
         cells = split_cells(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
@@ -211,7 +210,7 @@ class _Curve:
             self._read = [np.concatenate(self._read)]
         table = self._read[0]
         below = self._below
-        assert below is not None  # a line below the table precedes this row
+        assert below is not None  # A line below the table precedes this row.
         is_first = np.array_equal(table[0], state)
         position = 0 if is_first else self._repeated
         is_started = position > 0 or is_first
@@ -225,9 +224,8 @@ class _Curve:
             return
         is_header = is_time(split_cells(below.text, self.layout.separator)[0])
         continues = state[0] > float(table[-1, 0])
-        if (
-            is_header or continues
-        ):  # the table continues, so the line in between is damaged
+        # The table continues, so the line in between is damaged.
+        if is_header or continues:
             raise below.error
         problem = (
             f"{self._name}:{number}: another table begins here, after line {below.line} "

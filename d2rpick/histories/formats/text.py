@@ -22,46 +22,46 @@ if TYPE_CHECKING:
 UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8: Final = b"\xef\xbb\xbf"
 
-# Number of lines from which the form of a text is determined.
+# Number of lines from which encoding, separator and header of a text are determined.
 HEAD: Final = 10_000
 
-# Pattern of a number: digits before and after the decimal point, and the exponent.
+# Pattern of a number, with groups for the digits before and after the decimal point, and the exponent.
 _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
-# Number of significant digits that restore every double, and the pattern of a number without an exponent.
+# Number of significant digits that restore every double.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# A double keeps every number of 15 significant digits. A format that prints this many is treated as lossless.
+# Number of significant digits from which a format is treated as lossless; a double keeps all numbers of 15 digits.
 _FULL = 15
 
 
 class Text:
-    """The lines of a file, each with a line feed as its end; ``unended`` is a last line without end, or empty.
+    """The lines of a file, each ending with a line feed; ``unended`` is an unterminated last line, or empty.
 
     A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # Numbers of lines and bytes that are read at once.
-    top = HEAD  # number of lines from which the form of the text is determined
-    # size of a piece, whose cells fit into the processor's cache [bytes]
+    # The numbers below limit how many lines and bytes are read at once.
+    top = HEAD  # number of lines from which encoding, separator and header of the text are determined
+    # Size of a piece, whose cells fit into the processor's cache [bytes].
     piece = 1 << 17
-    # A text of at most this size is used completely to find the printed precision [bytes].
+    # Largest text of which all fields are used to find the printed precision [bytes].
     short = 1 << 16
-    # number of lines sampled at the start, at the end and in between, if the text is longer
+    # Number of lines that are sampled at the start, at the end and in between of a longer text.
     some = 100
-    # Size of a piece of a large text [bytes]; each call of pandas or scipy costs milliseconds.
+    # Size of a piece of a large text [bytes]; it is large because each call of pandas or scipy costs milliseconds.
     large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last terminated line.
+        # Offset after the last line that has a line end [byte].
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first terminated lines, from which the form of the text is determined."""
+        """The first lines that have a line end, from which the layout of the text is determined."""
         return self._first[: self.top]
 
     @property
@@ -81,12 +81,12 @@ class Text:
         return address
 
     def take_rest(self) -> None:
-        """Treat the last line, which has no end, as a complete line from now on."""
+        """Treat the unterminated last line as a complete line from now on."""
         self._end = len(self._data)
 
     @property
     def is_large(self) -> bool:
-        """True if the file stays on disk; only plain ASCII files do."""
+        """True if the file stays on disk while it is read; only plain ASCII files do."""
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
@@ -99,7 +99,7 @@ class Text:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
             if not end and begin + size < self._end:
-                size *= 2  # a single line is longer than the piece
+                size *= 2  # A single line is longer than the piece.
                 continue
             yield piece[:end] or piece + b"\n"
             begin += end or len(piece)
@@ -115,7 +115,7 @@ class Text:
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines from the start, the end and evenly in between, after byte ``begin``; of short texts all."""
+        """Return lines after byte ``begin``, from the start, from the end and in between; of a short text all lines."""
         data = self._data
         end = self._end
         count = self.some
@@ -165,7 +165,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
             data[address : address + piece] for address in range(0, len(data), piece)
         )
         if all(map(_is_plain, pieces)):
-            return data, "latin-1"  # Latin-1 contains ASCII
+            return data, "latin-1"  # Latin-1 contains ASCII.
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
@@ -220,7 +220,7 @@ def find_precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        if len(field) > digits:  # a field cannot have more digits than characters
+        if len(field) > digits:  # A field cannot have more digits than characters.
             digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
@@ -237,7 +237,7 @@ def find_precisions(
 
 
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
-    """Return True if the fields above show that the last field of a truncated file is complete.
+    """Return True if the fields above it show that the last field of a truncated file is complete.
 
     It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
     of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
@@ -267,7 +267,7 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
         return False
     decimals, width = shapes.pop()
     padded = any(part[2].endswith("0") for part in parts[1:] if part)
-    longest_start = 32  # first two digits of the largest exponent of a double, 324
+    longest_start = 32  # first two digits of 324, the largest exponent of a double
     exponent = parts[0][3] if parts[0] else None
     doubtful = (
         width == 2
@@ -278,18 +278,18 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
 
 
 def _count_significant_digits(field: str) -> int:
-    """Return the number of significant digits of a field, 0 if it is not a number."""
+    """Return the number of significant digits of a field; 0 if the field is not a number."""
     parts = _PARTS.fullmatch(field)
     if not parts:
         return 0
     digits = parts[1] + parts[2]
     if not digits.lstrip("0") and parts[3]:
-        return len(digits)  # the number 0.00000E+00 has six significant digits
+        return len(digits)  # The number 0.00000E+00 has six significant digits.
     return len(digits.lstrip("0"))
 
 
 def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the common number of decimals of all fields without exponent; None if there is none."""
+    """Return the number of decimals that all fields without an exponent share; None if they differ."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
     return decimals if are_alike else None
