@@ -107,6 +107,8 @@ _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # Effect of the second harmonic of a stiffening spring on R^2, where both deformations are alike, and where they are
 # farthest from being alike or opposite.  A spring whose amplitude falls also changes its rate.
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
+# R^2 of deformations that are equal and opposite: lines that say nothing leave no more open.
+_MOST_OPPOSED: Final = 4.0
 # Squared difference of an oscillating stretch at two times over its mean square; it is 2 on average, 8 at most.
 _SWINGING_COUNTS: Final = 4.0
 _HIDDEN_LINES: Final = 12  # assumed number of lines hidden in the misfit
@@ -374,7 +376,9 @@ class ModalVibration:
         )
         deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # Both show how accurate the lines are: the scatter of the fit, and the fit to the first part of the record.
-        of_lines = np.minimum(np.maximum(deviation, lines), np.maximum(squared, 1.0))
+        of_lines = np.minimum(
+            np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
+        )
         of_rest = _REST_COUNTS * self.noise / level * np.sqrt(self._structure_of_rest)
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
         off = np.asarray(

@@ -70,12 +70,16 @@ class Ranked(NamedTuple):
     is_good: bool
 
 
-def find_limit_of_alike(ranked: list[Ranked]) -> float:
-    """Return the expected error that the band of the best candidate leaves open, within its grade."""
+def select_alike(ranked: list[Ranked]) -> list[Ranked]:
+    """Return the candidates that the band of the best one does not tell from it, within its grade."""
     smallest = min(row.error for row in ranked)
     expected = min(row.expected for row in ranked if row.error == smallest)
-    bounds = [bound for bound in (0.5, 1.0) if expected <= bound]
-    return min([max(smallest, expected), *bounds])
+    limit = max(smallest, expected)
+    highest = max(2 * smallest**2 - expected**2, limit**2) ** 0.5
+    if np.isinf(smallest):
+        highest = np.inf
+    limit = min([limit, *(bound for bound in (0.5, 1.0) if expected <= bound)])
+    return [row for row in ranked if row.expected <= limit and row.error <= highest]
 
 
 @given(rows, st.booleans())
@@ -112,9 +116,9 @@ def test_the_order_of_candidates(
             candidate_rows[i] for i in order_found if candidate_rows[i].group == number
         ]
         near = min(row.error for row in ranked) + EQUALLY_GOOD
-        limit = find_limit_of_alike(ranked)
+        within_band = select_alike(ranked)
         alike = [row for row in ranked if row.is_good] or [
-            row for row in ranked if row.error <= near or row.expected <= limit
+            row for row in ranked if row.error <= near or row in within_band
         ]
         longest = max(row.rigid for row in alike)
         late = [row for row in alike if row.rigid < 0.9 * longest]
@@ -149,6 +153,8 @@ def make_errors(*errors: tuple[float, float, bool]) -> Errors:
         # The band of the shorter pair leaves open whether it is better.
         ([(0.62, 0.57, False), (0.66, 0.6, False)], 1),
         ([(0.58, 0.57, False), (0.66, 0.6, False)], 0),
+        # A pair that may be far worse is not like the best.
+        ([(0.62, 0.57, False), (1.5, 0.6, False)], 0),
         # Not beyond the limit of a grade, nor beyond what a release without a vibration has.
         ([(0.55, 0.45, False), (0.6, 0.52, False)], 0),
         ([(1.1, 0.9, False), (1.2, 1.05, False)], 0),

@@ -118,16 +118,22 @@ def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
     return (residual <= MOST_GOOD) & (highest <= _MOST_HIDDEN)
 
 
-def find_limit_of_band(error: Samples, residual: Samples) -> Samples:
-    """Return the residual up to which pairs cannot be distinguished from one with this ``residual``, in its shape [-].
+def is_within_band(
+    error: Samples, expected: Samples, error_of_best: Samples, best: Samples
+) -> NDArray[np.bool_]:
+    """Return True for each pair that cannot be distinguished from the best one within its error band, shape (n,).
 
-    That is its ``error``, which lies halfway to the upper bound of its band (in the square), but not beyond the limits
-    of a grade, and not above that of a release without any vibration.
+    An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
+    A pair is expected to be no worse than the error of the best one, and its own error is no worse than the upper bound
+    of that.  It is also on the same side of the limits of a grade, and of a release without any vibration.
     """
-    limit = np.maximum(error, residual)
+    limit = np.maximum(error_of_best, best)
+    # Warnings are not needed, because the bound is unknown if all errors are infinite.
+    with np.errstate(invalid="ignore"):
+        highest = np.sqrt(np.fmax(2 * error_of_best**2 - best**2, limit**2))
     for bound in (POOR_RESIDUAL, NOTHING_KEPT):
-        limit = np.where(residual <= bound, np.minimum(limit, bound), limit)
-    return limit
+        limit = np.where(best <= bound, np.minimum(limit, bound), limit)
+    return np.asarray((expected <= limit) & (error <= highest))
 
 
 class Errors(NamedTuple):
@@ -164,8 +170,9 @@ def order_by_quality(
     expected_of_best = _find_extremes(
         np.minimum, group, np.where(is_best, expected, np.inf), groups
     )
-    limit_of_band = find_limit_of_band(smallest, expected_of_best)
-    is_near = (error <= (smallest + room)[group]) | (expected <= limit_of_band[group])
+    is_near = (error <= (smallest + room)[group]) | is_within_band(
+        error, expected, smallest[group], expected_of_best[group]
+    )
     has_good = np.bincount(group[errors.is_good], minlength=groups) > 0
     is_like = np.where(has_good[group], errors.is_good, is_near)
     longest = _find_extremes(

@@ -13,9 +13,9 @@ from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     LIKE_LEVELS,
     ROUNDING,
-    find_limit_of_band,
     get_limit_of_like_quality,
     is_good_residual,
+    is_within_band,
     rank_candidates,
     rate_certainty_of_tr,
 )
@@ -471,9 +471,9 @@ def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
     highest = np.array([pair.residual_high for _, pair in pairs], np.float64)
     doubted = np.sqrt((errors**2 + np.fmax(highest, errors) ** 2) / 2)
     best = int(np.argmin(doubted))
-    limit_of_band = find_limit_of_band(doubted[best], errors[best])
-    limit = max(float(limit_of_band), float(errors[best]) + EQUALLY_GOOD)
-    return [pair for pair, error in zip(pairs, errors, strict=True) if error <= limit]
+    is_alike = is_within_band(doubted, errors, doubted[best], errors[best])
+    is_alike |= errors <= errors[best] + EQUALLY_GOOD
+    return [pair for pair, alike in zip(pairs, is_alike, strict=True) if alike]
 
 
 def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
