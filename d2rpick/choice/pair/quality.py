@@ -121,8 +121,9 @@ def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
 def is_within_band(
     error: Samples, expected: Samples, error_of_best: Samples, best: Samples
 ) -> NDArray[np.bool_]:
-    """Return True for each pair that cannot be distinguished from the best one within its error band, shape (n,).
+    """Return True for each pair that cannot be distinguished from the best one within its error band.
 
+    All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
     A pair is expected to be no worse than the error of the best one, and its own error is no worse than the upper bound
     of that.  It is also on the same side of the limits of a grade, and of a release without any vibration.
