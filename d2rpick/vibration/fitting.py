@@ -52,7 +52,7 @@ _MEDIUM: Final = 2048
 _NEAR: Final = 1e-6
 # Largest rms misfit relative to the standard deviation of the energy [-]; a larger misfit may hide another mode.
 MAX_MISFIT: Final = 0.4
-# Safety factor on the largest misfit if only some of the samples are used [-].
+# Safety factor on the largest variance of the misfit if only some of the samples are used [-].
 _FAR_TOO_MUCH: Final = 1.2
 # Largest number of start values that are refined, because the first may not be the best.
 STARTS: Final = 3

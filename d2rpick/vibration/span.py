@@ -136,7 +136,7 @@ def find_oscillator(
 def _add_what_is_hidden(
     history: History, fit: Identification, span: Span | None
 ) -> Identification:
-    """Add to an accepted fit the energy of a further mode that may be hidden in the misfit in its window or ``span``."""
+    """Add to an accepted fit the energy of a mode that may be hidden in the misfit in its window or ``span``."""
     if not fit.describes_record or fit.mode is None:
         return fit
     described = span or Span(fit.start, fit.end)
