@@ -324,7 +324,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # rounding error of the energy, from its number of printed digits
+            # The quantum is the rounding error of the energy, which depends on its number of printed digits.
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)

@@ -95,7 +95,7 @@ class Touches(NamedTuple):
 def _select_outer_forces(
     forces: Sequence[ContactForce], whole: Momenta
 ) -> list[ContactForce]:
-    """Return the forces whose impulses appear in the momentum of the model next to a constant gravity.
+    """Return the forces whose impulses change the momentum of the model, apart from a constant gravity.
 
     An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
     side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces

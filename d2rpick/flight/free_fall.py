@@ -192,7 +192,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) along an axis, found from the momentum at right angles to a load of constant direction."""
+        """Yield possible weights (3,) along an axis, from the momentum at right angles to a steadily directed load."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]

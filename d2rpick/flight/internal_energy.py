@@ -29,7 +29,7 @@ _BAND_RESERVE: Final = 0.25
 # Share of the time before td that is not used for the energy band [-], because the load may still act in it.
 # In 45 computed runs, the energy entered its band too early by up to 0.3 of this time.
 _WAIT: Final = 1 / 3
-# _OUTER: share of the energies above, and share below, the central range that only contacts leave by far [-].
+# _OUTER: the lowest and the highest energies with this share of all energies are outside of the usual range [-].
 # _LATEST: share of the time before td in which the usual rate of the energy is measured [-].
 # _FASTER: a contact changes the energy at least this many times as fast as usual [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0

@@ -268,7 +268,7 @@ class _Apart(NamedTuple):
 def _find_next_moving_part(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
-    """Find the part whose removal makes the others most nearly rigid.
+    """Find the part without which the other parts move most nearly like a rigid body.
 
     If one part slides, all parts may seem to rotate.  Among parts that are equally good, the one with the largest
     effect is chosen.

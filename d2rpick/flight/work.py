@@ -90,7 +90,7 @@ def compute_work_beyond_gravity(
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Return an upper bound of the mass by which the integral of F v is multiplied, from the kinetic energy."""
+    """Return an upper bound of the mass, which limits the work of gravity, from kinetic energy and velocity."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     if fast.any():

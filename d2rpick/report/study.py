@@ -254,7 +254,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest error as text; one number if both are displayed alike."""
+    """Return the smallest and largest error as text, or one number if both are displayed alike."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"

@@ -309,7 +309,7 @@ class Observer:
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
     ) -> LegFindings:
-        """Return what the histories of joined legs show at the end of the last one.
+        """Return the findings from the joined histories of several legs at the end of the last leg.
 
         ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
         the record shows a longer one, which ``why`` then says.

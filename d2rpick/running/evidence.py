@@ -214,7 +214,7 @@ class GrowingEvidence:
         return None
 
     def find_rigid_times(self) -> list[tuple[float, float, float]]:
-        """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
+        """Return the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
 
         The last of these periods may last to the end of the record.
         """

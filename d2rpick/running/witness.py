@@ -41,7 +41,7 @@ _MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """A flight, which is a force-free time that lasted for the required time.
+    """A flight, which is a period without force that lasted for the required time.
 
     Attributes
     ----------

@@ -291,7 +291,7 @@ class _Record(NamedTuple):
         start = float(time[0])
         end = float(time[-1])
         scale = float(np.ptp(energy))
-        # Older numpy versions warn of an overflow when they divide numbers this small, although the result is correct.
+        # When dividing very small numbers, older numpy versions warn of an overflow although the result is correct.
         with np.errstate(over="ignore"):
             scaled = energy / scale
         return cls((time - start) / (end - start), scaled, start, end, scale)

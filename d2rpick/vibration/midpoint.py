@@ -56,7 +56,7 @@ class Reading:
 
     @cached_property
     def _peak_energies(self) -> Samples:
-        """Return the energy h of each mode at the origin [energy]."""
+        """Return the peak energy of each mode at the time origin [energy]."""
         return 2 * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
@@ -80,7 +80,7 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """Return H, the energy of all modes averaged over a period, with the shape of ``t`` [energy]."""
+        """Return the peak energy H of all modes, averaged over a period, with the shape of ``t`` [energy]."""
         if self.no_static:
             level = 2 * self.spectrum.mean.at(t)
         else:

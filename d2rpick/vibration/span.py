@@ -98,7 +98,7 @@ def find_oscillator(
     whole: bool = False,
     quick: bool = False,
 ) -> tuple[Span | None, Identification]:
-    """Return the window around ``td`` that an oscillator describes, and its fit: given, or else identified.
+    """Return the window around ``td`` that a given or identified oscillator describes, and its fit.
 
     Parameters
     ----------

@@ -644,7 +644,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
+    """Describe by which factor the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"

@@ -427,7 +427,7 @@ def _warn_about_windows(
         for caution in row.answer.cautions if row.answer else ():
             if (
                 caution.code == WRONG_ENERGY
-            ):  # this warning concerns the whole run, not a flight
+            ):  # The warning concerns the whole run, not a single flight.
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)
