@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
 
 # An external contact changes the momentum of the model by at least this share of its impulse [-].
-# The share is small, because the output may miss up to 1/3 of the impulse of an intermittent contact.
+# The output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
 # _PIECES: number of pieces of a flight whose mean energies are compared.
 # _RISE: a mean energy that rises by this share of the highest energy shows a crash.

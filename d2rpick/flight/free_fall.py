@@ -79,7 +79,7 @@ class Laws:
     def __init__(
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
-        """Prepare the laws for the parts in columns ``members``. The energies ``balance`` bound an unknown mass."""
+        """Prepare the laws of free flight for the parts in columns ``members``; ``balance`` limits an unknown mass."""
         time = momenta.time
         momentum = momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
@@ -471,7 +471,7 @@ class FreeFall(Law):
         )
 
     def _select_states(self, first: int, last: int) -> slice | NDArray[np.intp]:
-        """Return the states between two states to which the law is fitted."""
+        """Return the slice of states between two states to which the law is fitted."""
         return slice(first, last + 1)
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:

@@ -42,8 +42,8 @@ _STATES: Final = 200
 # The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
 _STEADY: Final = 1e-4
 # A position error is a lower bound if the other parts deform by more than this share of the part's motion [-].
-# In computed cars with correct position errors, this share was at most 0.24.
-# In a public car model with position errors that were 3 to 4 times too small, this share was 1.1 to 1.4.
+# In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
+# In a public car model with position errors that were 3 to 4 times too small, the deformation was 1.1 to 1.4 of it.
 _NOTABLE_DOUBT: Final = 1 / 3
 # Position errors below this share of the largest acceptable one are negligible, even if they are underestimated [-].
 _HARDLY: Final = 0.01

@@ -139,7 +139,7 @@ def _list_verdict_of_requested(
 
 
 def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
-    """Return what the next better td changes, after the name of the line."""
+    """Return what the next better td changes, as a (name, sentence) pair."""
     return ("other td", _describe_step(trade_off, requested))
 
 

@@ -128,7 +128,7 @@ class GrowingEvidence:
         written: tuple[Momenta | None, Balance | None],
         is_used: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Append states to the evidence of a set of parts, which begins anew after states that are not used.
+        """Append states to the evidence of a set of parts; after states that cannot be used, the evidence starts again.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """

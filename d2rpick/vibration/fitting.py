@@ -235,7 +235,7 @@ def _find_starts(
         alpha = np.concatenate((alpha, 2 * alpha))
     alpha = np.maximum(
         alpha, -1.0
-    )  # The limit keeps exp from overflowing; growth is refused later.
+    )  # The limit prevents an overflow of exp. Growing vibrations are refused later.
     vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
     square = vibration * vibration
     rows = [
@@ -365,7 +365,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
     """
 
     def excess(products: Samples) -> float:
-        """Return how far a mean of products exceeds the limit for white noise."""
+        """Return how far the sum of products of neighbouring misfits exceeds the limit for white noise."""
         return abs(float(np.sum(products))) - deviations * float(
             np.linalg.norm(products)
         )

@@ -398,7 +398,7 @@ class Evidence(NamedTuple):
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Return the best reliable model; ``whole`` is the oscillator or, without one, the samples of the energy."""
+    """Return the best reliable model; ``whole`` is the oscillator or, if there is none, the samples of the energy."""
     if not evidence.signed:
         return whole
     basis = evidence.signed

@@ -170,7 +170,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # The share is NaN if it is undefined for lack of a vibration.
+        return share  # The kinetic fraction is NaN if nothing vibrates.
 
     @property
     def earliest_tr(self) -> float | None:
