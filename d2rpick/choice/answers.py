@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# The search for a better pair ends after this many pairs at other peaks were examined in full and refused.
+# The search for a better pair ends after this many pairs at other energy peaks were refused.
 _MOST_REFUSED = 3
 
 
@@ -84,7 +84,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def verified(self) -> bool:
-        """True if the pair is admissible and not poor, and its residual is at most 0.5."""
+        """True if the pair is admissible, its grade is not poor, and its residual is at most 0.5."""
         residual = self.candidate.residual
         is_kept = residual is None or residual <= POOR_RESIDUAL
         return is_kept and self.decision.grade != POOR
@@ -458,14 +458,14 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td in the same way as at a td that the user gives."""
-    # An oscillator is searched for again, but not the reason why there is none.
+    # The oscillator is fitted again, but the time-consuming search for the reason why there is none is omitted.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
 
 def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> bool:
     """Return True if ``verify`` accepts a pair once it is rounded to the six printed digits."""
-    # Rounding may move a time beyond the record, or make both times equal.
+    # RangeError means that rounding has moved a time beyond the record or made both times equal.
     try:
         return verify_at(
             _examine_anew(situation, round_as_read(td)), round_as_read(tr)
@@ -571,7 +571,7 @@ def compare_with(
         verdict,
         switched=comparison,
         computed=switched.history,
-        # a wrong motion overrules the verdict
+        # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
@@ -579,7 +579,7 @@ def compare_with(
 
 
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
-    """Add the health of the run in the rigid window, or else in the flight up to td, with its warnings.
+    """Add the health of the run, with its warnings, in the rigid window or else in the flight up to td.
 
     The time after td does not matter for the choice.
     """

@@ -26,22 +26,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
 
 # Largest hourglass energy as a share of the peak internal energy, for the model and for each part.
-# Sources: rule of thumb of DYNAmore (dynasupport.com/howtos/element/hourglass), 10 %;
-# NCHRP Web-Only Document 179 (2010), table E-1, 10 %.
+# One source of the hourglass limit is the rule of thumb of DYNAmore (dynasupport.com/howtos/element/hourglass).
+# Another source of the hourglass limit is NCHRP Web-Only Document 179 (2010), table E-1.
 MOST_HOURGLASS = 0.10
-# Largest variation of the total energy: NCHRP Web-Only Document 179 (2010), table E-1.
+# Largest relative change of the total energy [-] (source: NCHRP Web-Only Document 179 (2010), table E-1).
 MOST_IMBALANCE = 0.10
-# Largest contact energy without friction, as a share of the peak internal energy.
-# Source: dynasupport.com/howtos/general/contact-energy.
-# Negative contact energy has no physical cause but comes from penetrations; Oasys' check allows 5 % of either sign.
+# MOST_SLIDING: largest contact energy without friction, as a share of the peak internal energy [-].
+# The source of MOST_SLIDING is dynasupport.com/howtos/general/contact-energy.
+# MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a share of the peak internal energy [-].
+# A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# Internal energies below the share _TINY_SHARE of the run's largest energy, or below _FLOOR, are rounding errors.
-# Single precision and glstat have six to seven digits; LS-DYNA's internal energy starts at 2e-20 per process.
+# _TINY_SHARE: internal energies below this share of the run's largest energy are treated as rounding errors [-].
+# The share follows from the precision of the files: single precision and glstat have six to seven digits.
+# _FLOOR: internal energies below this are treated as 0 [energy]; LS-DYNA's start at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
 # Parts whose internal energy is below this share of the largest part energy are ignored [-].
 _SMALL_PART = 0.01
-# The energy ratio is used only while the energy to which it refers exceeds this share of its peak,
-# since a small error is a large ratio while a run has hardly any energy (Altair, Radioss FAQ on the energy error).
+# The energy ratio is used only while its reference energy exceeds this share of its peak [-].
+# Below this share, even a small error gives a large ratio (source: Altair, Radioss FAQ on the energy error).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
@@ -49,14 +51,16 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# Criteria of a run that diverged: within this share of the record its kinetic energy exceeds all earlier energies by
-# a factor of 1e9, the internal energy is still below 1e-6 of it, and the internal energy grows by a factor of 1000.
-# Sound runs do not do this: a load on a body at rest also deforms it, and an initial velocity deforms nothing.
+# A run has diverged if it meets the following three criteria within the share _WITHIN of the record.
+# _GAIN: the kinetic energy exceeds all earlier energies by this factor [-].
+# _SPEED: the kinetic energy exceeds the internal energy by this factor [-].
+# _TORN: the internal energy grows by this factor [-].
+# Sound runs do not meet them, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# This many earlier states must have energy, because the first states of a body at rest contain round-off or 0.
+# The criteria need this many earlier states with energy, because the first states may contain only round-off.
 _FEWEST: Final = 12
-# Energies below this value are treated as zero in any unit; LS-DYNA's energies start at 2e-20 per process.
+# Energies below this value are treated as zero in any unit system, because LS-DYNA's energies start at 2e-20.
 _NOTHING: Final = 1e-20
 
 
@@ -155,7 +159,7 @@ def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caut
 
 def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
-    if not any("T0" in name for name in sources):  # not a Radioss engine run
+    if not any("T0" in name for name in sources):  # no listing of a Radioss engine
         return
     # Imported here to keep start-up fast.
     from d2rpick.histories.listings import (
@@ -188,8 +192,8 @@ def _is_unbalanced(health: Health) -> bool:
     )
 
 
-# Code of each warning, the condition for it, and its text.
-# LS-DYNA keeps the energy of eroded elements in the model's internal energy (ftp.lstc.com, FAQ energy_balance).
+# Code of each warning about the health of a run, the condition for the warning, and its text.
+# The internal energy of an LS-DYNA model includes that of eroded elements (ftp.lstc.com, FAQ energy_balance).
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
      f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
@@ -320,7 +324,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # half a unit of the printed digits
+            # rounding error of the energy, from its number of printed digits
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
@@ -385,7 +389,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # number of states that lie more than 5 % of the record before each state
+    # number of states that are earlier than each state by more than the share _WITHIN of the record
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
@@ -395,7 +399,7 @@ def _describe_divergence(history: History) -> str | None:
         for energies in (kinetic + internal, internal)
     )
     gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
-    # Quotients are compared, since products might overflow.
+    # The criteria compare quotients, because products might overflow.
     gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)

@@ -51,7 +51,7 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Add the times at which the force of the named contact or rigid wall acts, and the closing speed of the parts.
+    """Add the times at which the named contact or rigid wall exerts a force, and the closing speed of the parts.
 
     The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
     """
@@ -163,7 +163,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # there is no level to match
+    if verdict.situation.at_rest:  # There is no energy level to match.
         return
     measures = [
         f"{name} {value:.3f}"

@@ -88,11 +88,10 @@ def _describe_use(**use: Any) -> dict[str, Use]:
     return {"use": Use(**use)}
 
 
-# Not frozen although it is never changed, like other tables of options, because frozen classes take 2 % of the
-# start-up time of each command.
+# The class is not frozen, although its objects are never changed, because frozen classes slow start-up by 2 %.
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
-    """How to choose and judge a pair; times have the unit of the history.
+    """The options that define how a pair is chosen and judged; times have the unit of the history.
 
     An option that is a limit of a recommendation has a ``limit`` of a quantity: suggest, verify, explore, plan, study
     and check then refuse a pair that exceeds it, say so, and leave it out of the windows.
@@ -167,7 +166,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # Rigid elements do not limit the time step, so that this cannot become smaller.
+    # Rigid elements do not limit the time step, so the time step cannot become smaller.
     step_ratio: float | None = make_option(
         "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,

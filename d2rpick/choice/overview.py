@@ -48,13 +48,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# the Radioss output that contains part momenta
+# Radioss output that contains part momenta
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 class PartOverview(NamedTuple):
-    """A part and its highest internal energy; None if that is not written, or not in every state."""
+    """A part and its highest internal energy; None if the energy is not written, or not in every state."""
 
     part: Part
     energy_max: float | None
@@ -313,7 +313,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
         energies = give_if_written(lambda: run.part_energies(run.parts))
     else:
         energies = np.empty((0, 0))
-    if energies is None:  # a part is missing in some states
+    if energies is None:  # The part is missing in some states.
         return (
             PartOverview(part, _find_highest_energy_of_part(run, part))
             for part in run.parts

@@ -60,7 +60,7 @@ def read_reference(
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-# Not frozen although it is never changed, because the table of options that it extends is not frozen.
+# The class is not frozen, because the class of options that it extends is not frozen.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Settings(ChoiceOptions):
     """The analyst's settings: the options of a choice, and the data from the deck of the run.

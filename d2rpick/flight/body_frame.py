@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import NodeMotion, Samples
     from d2rpick.histories.names import Part
 
-# Reads the displacements of those of some nodes that are written; None without any.
+# Function that reads the motion of those of the given nodes whose motion is written; None if there are none.
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body.
-# A body that is bent more, or placed elsewhere, has no orientation to 0.1 degrees.
+# The orientation of a body with a larger deviation cannot be determined to 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Connected parts define the body frame if they have this share of its mass, else all parts that do not move.
+# Connected parts define the body frame if they have at least this share of the mass of the body [-].
 _MOST: Final = 0.5
 # Points are treated as lying on a line if one moment of inertia is below this share of the others.
 _ALONG_LINE: Final = 1e-9
-# So many nodes, spread over the body, define its frame; more of them would be read for little.
+# Number of nodes, spread over the body, that define its frame; more nodes would hardly improve it.
 _MOST_NODES: Final = 50
 
 
@@ -103,7 +103,7 @@ def choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return how much the rotation between two times changes if each frame part is left out in turn.
+    """Return how much the rotation between two times changes if each part that defines the frame is left out in turn.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
     line determine no angle and give 0.

@@ -249,7 +249,7 @@ def end_flight_at(
 
 
 def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:
-    """Return True if there is no flight at td, and the nearest flight ends before ``after`` or begins after td."""
+    """Return True if td is in no flight, and the nearest flight ends before ``after`` or begins after td."""
     if not flight.refusal or flight.start is None:
         return False
     return flight.start > td or (flight.end is not None and flight.end <= after)

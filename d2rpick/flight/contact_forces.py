@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import History, Momenta, Samples
 
-# An external contact leaves at least this share of its impulse in the momentum of the model.
-# The share is this small because 1/3 of the impulse of an intermittent contact may fall between two states.
+# An external contact changes the momentum of the model by at least this share of its impulse [-].
+# The share is small, because the output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
 # _PIECES: number of pieces of a flight whose mean energies are compared.
 # _RISE: a mean energy that rises by this share of the highest energy shows a crash.
-# In computed flights with many beating modes the mean rises by up to 0.06, in a crash by nearly 1.
+# In computed flights with many beating modes, the mean energy rises by up to 0.06 of the highest energy.
+# In a crash, the mean energy rises by nearly the highest energy.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
@@ -65,7 +66,7 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Return the window without contact around ``td`` [time]; None if a contact acts at td or it is too short.
+        """Return the window without contact around ``td`` [time]; None if it is too short or a contact acts at td.
 
         Forces do not show whether gravity acts, so gravity is NaN.
         """

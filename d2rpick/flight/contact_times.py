@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 
 # A change of momentum shows a force if it exceeds the largest deviation in the longest flight by this factor.
 _SEEN: Final = 4.0
-# Forces below this share of the weight are ignored, because momenta in the first state belong to half a step earlier.
+# Forces below this share of the weight are ignored [-], because the momenta in the first state are half a step old.
 _OF_WEIGHT: Final = 0.1
 # Number of states left out at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-_FEWEST: Final = 2  # the longest flight must keep this many intervals
-# A force that is seen in only one interval is assumed to act for this share of the interval, in its middle.
+# Smallest number of output intervals that the longest flight must have without its ends.
+_FEWEST: Final = 2
+# A force that is detected in only one interval is assumed to act in its middle, for this share of its length [-].
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 

@@ -1,4 +1,4 @@
-"""Parts of a switched run in a flight outside of its rigid windows, in which they are deformable again.
+"""Find the parts of a switched run that are deformable again in a flight after its rigid windows.
 
 While a rigid body has absorbed parts, their momenta are not written, and the flights of a switched run are those of the
 whole model.  In a flight during which the momenta of the parts add up to that of the model, they show how the parts

@@ -44,11 +44,11 @@ SOURCES: Final = (
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load in a flight, as a share of the energy.
-# It causes a deformation error of 2 %, and deformations that differ by 2 % are ranked as equally good.
+# This work causes a deformation error of 2 %, which is the smallest error that affects the ranking of pairs.
 MOST_WORK: Final = 0.04
-# These sources must confirm each flight that a better source shows, because they contain the contacts of all parts.
+# Sources that must confirm each flight from a better source, because they contain the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# These sources may miss a load: some forces are not written, and fixed walls do no work.
+# Sources that may miss a load, because some forces are not written, and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
 # Two ends of a flight agree if they differ by at most this share of its length, or by this many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
@@ -154,7 +154,7 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td. The search begins at the first search mark in it, or else at td itself."""
+        """Return the flight around td. The search begins at the first fixed start time in it, or else at td itself."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
@@ -165,7 +165,7 @@ class Witness(NamedTuple):
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``. The search begins at marks shared by many td, or else at td itself."""
+    """Return the flight around ``td``. The search begins at a time that many td share, or else at td itself."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -390,7 +390,7 @@ def _find_flight_by_energies(
             and isinf(flight.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
-            return None  # without gravity no work is done on the model
+            return None  # Without gravity, no load does work on a model in flight.
         if not (flight and has_whole_motion(history.balance, flight.start, flight.end)):
             flight = None
     return limit_to_unheld(history.surroundings, flight, history.parts, td)
@@ -399,7 +399,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces; if the energy rises, only its part on one level.
+    """Return the flight around td from contact forces; if the energy rises, only the part with a steady energy level.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -453,7 +453,7 @@ def _limit_to_level(
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
     if start is not None and start > flight.start and momenta is not None:
-        # Without gravity this is the sum of energies. With gravity the work of gravity is subtracted from the last sum.
+        # The last sum of energies excludes the work of gravity, and the first sum includes it.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -466,7 +466,7 @@ def _limit_to_level(
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
-            return None  # Opposite forces may still hold and deform the model, which keeps its momentum.
+            return None  # Opposite forces may deform the model without changing its momentum.
     return flight._replace(start=start)
 
 

@@ -30,38 +30,39 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, Momenta, Samples
 
-# Gravity on earth in m, inches and feet per second squared; in other units it is a power of ten times one of these.
-# An acceleration within this relative deviation is gravity: a load comes so close by chance in 1 of 200 cases.
+# _GRAVITY: gravity in m, inches and feet per second squared; other units differ by a power of 10.
+# _ALIKE: an acceleration is gravity within this relative deviation [-]; 1 load in 200 comes so close by chance.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Rounding error of the fitted change of momentum, in rounding errors of the momentum; fitting damping amplifies it.
+# Rounding error of the fitted change of momentum, in rounding errors of the momentum, which fitting amplifies [-].
 _REACH_OF_DIGITS = 10.0
-# Tolerances for recognising gravity while a load fades: 5 % in size, direction cosine 0.999 with an axis.
+# _ROUGHLY: relative tolerance for the size of gravity while a load fades [-].
+# _ALONG_AXIS: while a load fades, gravity has at least this direction cosine with an axis [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# If damping takes more than the share _DAMPED of the momentum in a window,
-# at least the share _LEFT of the largest momentum must remain.
+# _DAMPED: damping that takes at most this share of the momentum in a window is not suspected to be a load [-].
+# _LEFT: stronger damping is a load if less than this share of the largest momentum remains [-].
 _DAMPED, _LEFT = 0.2, 0.05
-# Largest share of the momentum that damping takes between two states.
+# Damping that takes more than this share of the momentum from each state to the next is a load [-].
 _SHOWN = 0.1
 # Deviation allowed in a window without loads, as a share of the largest momentum and of its range.
-# A fading load may cause this deviation, and the momentum may then change by twice as much over the window.
-# If only some of the moving parts are tried, TOLERANCE is used instead, because the rest of their body acts on them.
+# A fading load that causes this deviation may change the momentum by twice as much over the window.
+# For a subset of the moving parts TOLERANCE is used instead, because the other parts of their body act on them.
 _ENOUGH = 3e-3
-# Three limits for finding gravity at right angles to a load of constant direction.
-# _REACH_OF_NOISE: largest deviation at right angles to the load, in rounding errors.
-# _SEEN: smallest component of an axis at right angles to the load.
-# _CLEARLY: the deviation along the load must be at least this many times as large.
+# The next three limits are used to find gravity at right angles to a load of constant direction.
+# _REACH_OF_NOISE: largest deviation of the momentum at right angles to the load, in rounding errors [-].
+# _SEEN: smallest component at right angles to the load of an axis along which gravity may act [-].
+# _CLEARLY: smallest ratio of the deviation along the load to the deviation at right angles to it [-].
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# _FADED: a fading force falls to this share of its size from the first to the last third of a window.
-# _LITTLE: at the end a fading force is at most this share of the weight.
+# _FADED: a force fades if in the last third of a window it has at most this share of its size in the first third [-].
+# _LITTLE: at the end of a window a fading force is at most this share of the weight [-].
 _FADED, _LITTLE = 0.6, 0.02
-# Largest momentum across the direction of a straight motion, as a share of the momentum.
+# A motion is straight if the momentum at right angles to it is at most this share of the momentum [-].
 _STRAIGHT = 0.01
-# A change of momentum up to this many times the error in a window is treated as zero.
+# A change of momentum is treated as zero if it is at most this many times the fitting error [-].
 _UNSEEN = 2.0
-# Relative error of the work of gravity, because states are far apart and the solver sums energies over time steps.
+# Relative error of the work of gravity that is computed from the states [-].
 _OF_WORK = 2e-3
-# A mass that exceeds the lower bound from momenta and kinetic energies by this share was written by the solver.
+# A mass was written by the solver if it exceeds the lower bound from momenta and energies by this share [-].
 _CLEARLY_HEAVIER = 1e-6
 # Fewest states for a fit of work: twice the number of unknowns.
 _LEAST_STATES = 6
@@ -107,7 +108,7 @@ class Laws:
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
-        ):  # a push that balances the weight for a moment looks equally steady
+        ):  # A push that balances the weight for a moment also keeps the momentum constant.
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
@@ -121,14 +122,14 @@ class Laws:
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law and keep obeying it when the tolerance is made stricter."""
+        """Return the states around ``td`` that obey a law, even with a stricter tolerance."""
         return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
 
     @property
     def _carried(self) -> bool:
-        """Return True if a support must carry the parts in a window without visible force."""
+        """Return True if a support must carry the parts in a window in which their momentum shows no force."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -262,7 +263,7 @@ class Laws:
             return None if self._slowed(window, vector) else force / mass
         if (
             self.velocity
-        ):  # an acceleration is the change of a velocity, so the mass is not needed
+        ):  # The acceleration follows from the velocity, so the mass is not needed.
             return None
         gravity = None
         if self.balance is not None:
@@ -301,7 +302,7 @@ class Laws:
         )
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
-            return False  # the mass is exact because the solver wrote it
+            return False  # The mass is exact, because the solver wrote it.
         swing = float(np.ptp(balance.internal[find_window(balance.time, start, end)]))
         largest = force / self.mass
         lightest = largest * (1 - swing / float(kinetic[best]))
@@ -337,9 +338,7 @@ class Laws:
     @cached_property
     def fall(self) -> bool:
         """Return True if the parts fall under gravity at some time. If they never do, something supports them."""
-        self.fall = (
-            False  # preliminary value, because `fall` is used while it is computed
-        )
+        self.fall = False  # preliminary value, which is needed while `fall` is computed
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in list_moments(self.fit.time))
@@ -446,12 +445,12 @@ class FreeFall(Law):
         self.integral = integrate_by_trapezia(time, momentum)
         self._both = np.asfortranarray(
             np.hstack([momentum, self.integral])
-        )  # contiguous columns are faster for long windows
+        )  # Columns that are contiguous in memory are faster.
 
     def _misfit(self, first: int, last: int) -> float:
         if (
             last - first < 3
-        ):  # three parameters per component fit any three states exactly
+        ):  # The three parameters per component fit any three states exactly.
             return 0.0
         p, impulse, alpha = self._fitted(first, last)
         return float(np.abs(p + alpha * impulse).max())

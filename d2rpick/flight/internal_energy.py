@@ -24,43 +24,43 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Widening of the energy band before td, since the band may not contain a complete vibration.
+# Share by which the energy band before td is widened, because it may not contain a complete vibration [-].
 _BAND_RESERVE: Final = 0.25
-# Share of the time before td that is not used for the band. In 45 computed runs the energy entered its band too early,
-# by up to 0.3 of that time, while the load still acted.
+# Share of the time before td that is not used for the energy band [-], because the load may still act in it.
+# In 45 computed runs, the energy entered its band too early by up to 0.3 of this time.
 _WAIT: Final = 1 / 3
-# During a contact the energy leaves its central range for a moment; the share _OUTER is cut off at each end.
-# A contact changes the energy faster than the vibration does in the share _LATEST of the time before td,
-# by the factor _FASTER at least. A decaying vibration stays below that rate.
+# _OUTER: share of the energies above, and share below, the central range that only contacts leave by far [-].
+# _LATEST: share of the time before td in which the usual rate of the energy is measured [-].
+# _FASTER: a contact changes the energy at least this many times as fast as usual [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# The level is the mean energy over this share of the quiet time.
-# The level has changed once this mean leaves the band of the means before td, widened at both ends by its width.
+# The energy level is the mean energy over this share of the time without load [-].
+# The level has changed once this mean leaves the band of the means before td, widened by its width at both ends.
 _LEVEL: Final = 1 / 8
 # _KNOWN: a landing is detected by comparison with this share of the time before it.
-# _TURNED: the energy must have at least this many turning points in that time.
+# _TURNED: smallest number of turning points of the energy in the time with which a landing is compared.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Smaller energies, as a fraction of the largest one, are round-off: tables and single precision have seven digits.
+# Energies below this share of the largest energy are round-off [-], because files have about seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# The energy band of the last quarter of a flight, widened by this share of its width, contains all earlier energies.
+# The energies in a flight stay in the band of its last quarter, widened by this share of the band's width [-].
 _RESERVE: Final = 0.5
-# The means of the last two quarters differ by less than this share of the band.
-# The difference is 1 for a steady drift, and 0.3 for a vibration with 3/4 of a period in each quarter.
+# The mean energies of the last two quarters of a flight differ by less than this share of the energy band [-].
+# For a steady drift this share is 1; for a vibration with 3/4 of a period in each quarter it is 0.3.
 _DRIFT: Final = 0.35
-# A slow vibration has at least this many turning points with half of the range; a crash ends after one oscillation.
+# A slow vibration swings at least this many times by at least half of its range; a crash swings fewer times.
 _SWINGS: Final = 4
-# Ranges and means of both halves of a flight agree to this share.
+# In a slow vibration, the energy range in each half of a flight is at least this share of the total range [-].
 _ALIKE: Final = 0.75
-# _TO_ZERO: an energy that falls below this share of its peaks belongs to one vibration, which is at rest at the peaks.
-# _HARDLY: an oscillation below this share of the energy of a permanent deformation is ignored.
+# _TO_ZERO: an energy that falls below this share of its peaks belongs to a single vibration [-].
+# _HARDLY: an oscillation of the energy below this share of the plastic energy is ignored [-].
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# A body yields in its first oscillation if its energy comes within this share of its later level.
-# The energy may stay within this share of its minimum for at most the share _MOST_FLAT of the time in which it rises
-# (0.7 for a harmonic motion). It stays there for longer if bodies of the model collide later in the flight.
+# _FLAT: a body yields in its first oscillation if its energy comes within this share of its later level [-].
+# _MOST_FLAT: longest time for which the energy stays near its minimum, as a share of the time in which it rises [-].
+# For a harmonic motion this share is 0.7; it is larger if bodies of the model collide later in the flight.
 _FLAT, _MOST_FLAT = 0.1, 1.0
-# Kinetic energy supplies the energy of yielding, so the sum of both rises by at most this share of that energy.
+# Yielding is fed by kinetic energy, so the total energy rises by at most this share of the energy of yielding [-].
 _NOT_FROM_MOTION: Final = 0.1
 
 
@@ -90,7 +90,7 @@ def find_quiet_time(history: History, td: float) -> QuietTime | None:
         and max(energy_before.max(), -energy_before.min()) <= rounding
     )
     if fallen and td - start >= SHORTEST * (history.end - start):
-        # nothing has happened since the start
+        # No load has acted since the start of the record.
         burst = _find_burst(history, states)
         return QuietTime(start, burst, start, td)
     settled = find_end_of_load(history, td)
@@ -224,7 +224,7 @@ def _find_change_of_level(history: History, states: slice) -> float | None:
         return None
     sums = _sum_energies(history)[states.start :]
     means = (sums[width:] - sums[:-width]) / width
-    # The mean with the index ``count`` is the first with all its states after the given ones.
+    # The mean with the index ``count`` is the first one that is taken over later states only.
     low, high = _widen_band(means[: count - width + 1], 1.0)
     outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
     if outside.size:
@@ -353,7 +353,7 @@ def rises_as_it_yields(
 
 
 def _sum_later_losses(damped: Samples) -> Samples:
-    """Return the energy that damping takes from each state to the middle of the window's last quarter, shape (n,)."""
+    """Return the energy that damping takes from each state to the last quarter of a window, shape (n,)."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))

@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Smallest margin as a share of the flight. A switch moved the landing by up to 2.5 % of the flight
-# in 36 computed runs (OpenRadioss): by up to 1.1 % for a car-like structure, 2.5 % for a box with a block inside.
+# Smallest margin, as a share of the flight [-].
+# In 36 computed OpenRadioss runs, switching moved the landing by up to 2.5 % of the flight.
 LEAST_MARGIN: Final = 0.03
-# A momentum that changes by less than this share in a flight is rounded: no gravity is seen.
+# A momentum that changes by less than this share in a flight is constant except for rounding [-].
 _ROUNDING: Final = 1e-5
-# A force is searched for in at least this many states.
+# Smallest number of states in which a force is searched for.
 _FEWEST: Final = 3
-# A contact grazes the body if its force stays below the share _GRAZING_FORCE of the largest force on the body,
-# or if it changes the momentum by less than the share _GRAZING_MOMENTUM of the momentum towards the contact.
-# The surfaces then slide along each other, so a small position error moves the contact to a much earlier time.
-# A landing changes that momentum by more: by 1/4 at the tip of a slender body, and by at least 0.27 within the margin
-# in computed cars and boxes. The grazing contact of a computed car changed it by 0.02.
+# A small position error can move a grazing contact, in which surfaces slide along each other, to a much earlier time.
+# _GRAZING_FORCE: a contact grazes the body if its force stays below this share of the largest force on the body [-].
+# _GRAZING_MOMENTUM: a contact also grazes the body if it takes less than this share of the momentum towards it [-].
+# A landing takes more of this momentum: at least 1/4 in theory, and 0.27 in computed landings of cars and boxes.
+# The grazing contact of a computed car took 0.02 of this momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 
@@ -54,7 +54,7 @@ def compute_margin(
     place: float | None = None,
     turning: float | None = None,
 ) -> Margin:
-    """Return the margin before the contact that ends a flight: the given one, or else how much earlier this may come.
+    """Return the margin before the contact at the end of a flight: the given one, or how much earlier it may come.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 

@@ -35,26 +35,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A momentum is constant if its relative change is smaller: single precision has seven digits.
+# A momentum is constant if its relative change is below this [-], because single precision has seven digits.
 _CONSTANT = 1e-6
-# If a momentum is constant within its printed digits, the chosen parts must move by this many times the rounding.
+# A momentum, or its change, shows motion only if it exceeds its rounding error by this factor [-].
 _VISIBLE = 100
-# A larger set of parts is preferred only if its window is longer by this factor.
-# A part with a large momentum of its own, such as a sled, loosens the tolerance for the other parts.
+# A larger set of parts is preferred only if its window is longer by this factor [-].
+# The factor exceeds 1, because a part with a large momentum, such as a sled, increases the tolerance for all parts.
 _LONGER = 1.1
 # _LOOK_BACK: share of the record before td that is searched for attached parts.
 # _LOOK_STATES: largest number of states used for this search.
-# _CANCELS: the momenta of a body, added up, deviate from a straight line by less than this share.
+# _CANCELS: the sum of the momenta of a body deviates from a straight line by less than this share [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# A decrease of the summed deviation below this share is treated as rounding error.
-# Without this limit a part of almost no mass would be added and removed endlessly.
+# A decrease of the summed deviation by less than this share is treated as rounding error [-].
+# Without this limit, the search could add and remove a part of almost no mass endlessly.
 _ROUNDED: Final = 1e-9
 # A set of parts is at rest or held if its final speed is below this share of its largest momentum.
 _HELD = 0.01
 # The part momenta add up to the model's momentum within this share, unless a rigid body has absorbed some parts.
 _ALL_OF_IT: Final = 1e-2
-# A body flies separately if it does so for at least the share _BY_ITSELF of the record,
-# and if its velocity differs by at least the share _OF_ITS_OWN.
+# _BY_ITSELF: a body flies separately if it does so for at least this share of the record [-].
+# _OF_ITS_OWN: a body flies separately if its velocity differs from that of the others by at least this share [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"
@@ -130,7 +130,7 @@ def _collect_bodies_apart(momenta: Momenta, *members: int) -> tuple[int, ...]:
 
 
 def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
-    """Find the parts among ``members`` that fly separately, see `find_bodies_apart`."""
+    """Find the parts among ``members`` that fly separately, as `find_bodies_apart` defines them."""
     mass = momenta.mass(members)
     masses = momenta.masses
     if (
@@ -152,7 +152,7 @@ def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[i
             momenta.values[:, part] / masses[part] - velocity, axis=1
         )
         if float(spans[relative > room].sum()) <= least_time:
-            continue  # a flight of this part would be too short to matter
+            continue  # A separate flight of this part would be too short to matter.
         apart = (
             flight.end - flight.start
             for flight in _find_flights_of_part(momenta, part)
@@ -201,7 +201,7 @@ def find_flight_of(
     if states is None or (
         not gravity and gravities is None and _has_falling_part(momenta)
     ):
-        return None  # a part that does not fall with the others is supported
+        return None  # A part that does not fall while others fall is supported.
     first, last = states
     inside = momentum[first : last + 1]
     if (
@@ -210,7 +210,7 @@ def find_flight_of(
     ):
         steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
-            return None  # the parts are held or at rest
+            return None  # The parts are held, or they are at rest.
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return limit_to_unheld(momenta.surroundings, flight, parts, td)
@@ -231,7 +231,7 @@ def get_laws_of(
 def _make_laws(
     momenta: Momenta, members: tuple[int, ...], _: bool, *, whole: Balance | None
 ) -> Laws:
-    """Return the laws of free flight for a set of parts, with the energies of the ``whole`` model, if they are used."""
+    """Return the laws of free flight for a set of parts; the energies of the ``whole`` model are used if given."""
     return Laws(momenta, members, whole)
 
 
@@ -319,7 +319,7 @@ def _find_attached_parts(
         return ()
     wider = (
         len(moving) > rests.shape[1]
-    )  # Only the right singular vectors are used; the full set of left ones would be large.
+    )  # The full set of left singular vectors is needed only if there are more parts than columns.
     left_vectors, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
@@ -382,7 +382,7 @@ def list_deformable_parts(run: OpenedRun) -> tuple[Part, ...]:
     parts = run.parts
     energies = run.part_energies(
         parts
-    )  # raises an error with the reason if there are none
+    )  # This call raises an error if no energies are written.
     with_energy = tuple(
         part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
     )
@@ -451,7 +451,7 @@ def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
         )
         if (
             len(core) <= len(attached) and core not in sets
-        ):  # the complete set was tried before
+        ):  # Each set is tried only once.
             sets.add(core)
             yield core
 

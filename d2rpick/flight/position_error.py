@@ -38,17 +38,17 @@ if TYPE_CHECKING:
 
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# The relative velocity of a loose part changes by less than this share.
-# For a connected part it changes by more as soon as the body turns by 0.01 degrees.
+# A part is not connected to the body if its relative velocity changes by less than this share [-].
+# The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
 _STEADY: Final = 1e-4
-# The error is a lower bound if the other parts deform by more than this share of the part's motion.
-# The share was at most 0.24 in computed cars whose errors were right, and 1.1 to 1.4 in a public car
-# whose errors were 3 to 4 times too small.
+# A position error is a lower bound if the other parts deform by more than this share of the part's motion [-].
+# In computed cars with correct position errors, this share was at most 0.24.
+# In a public car model with position errors that were 3 to 4 times too small, this share was 1.1 to 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Errors below this share of the limit are negligible, even if they are 3 times too small.
+# Position errors below this share of the largest acceptable one are negligible, even if they are underestimated [-].
 _HARDLY: Final = 0.01
 # Largest acceptable position error as a share of the path of the body: 1/3 of the margin before a contact.
-# That margin is 3 % of the flight, because landings of computed runs moved by up to that much.
+# The margin before a contact is 3 % of the flight.
 MOST_OF_PATH: Final = 0.01
 
 
@@ -201,7 +201,7 @@ def find_drift(
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # parts with unknown position are left out: the error would be too small otherwise
+    )  # Parts with unknown position are left out, because the error would be too small otherwise.
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -324,7 +324,7 @@ def _collect_flying(
         wanted = {part.id for part in parts}
     flying = [
         i for i in momenta.moving if momenta.parts[i].id in ids
-    ]  # a fixed ground does not fly
+    ]  # without fixed parts, such as the ground
     members = [i for i in flying if momenta.parts[i].id in wanted]
     return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
 
@@ -364,7 +364,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies of a flight with their displacements. ``told`` lists the deck's bodies, empty if one is assumed.
+    """Rigid bodies in a flight with their displacements. ``told`` lists the deck's bodies; if empty, one is assumed.
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them.
@@ -495,7 +495,7 @@ def _find_drift_of_body(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Return the displacement of a body of parts with energy; a single flying part has none."""
+    """Return the displacement of a body whose parts have energy; None for a single flying part."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

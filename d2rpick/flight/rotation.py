@@ -21,27 +21,26 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A rotation is accepted if it leaves less than this share of the displacements unexplained; the rest may be vibration.
+# A rotation is accepted if it leaves less than this share of the displacements unexplained [-].
 _SHOWN: Final = 0.25
-# Most Gauss-Newton steps; a dozen steps reach full precision from a good start.
+# Largest number of Gauss-Newton steps; a dozen steps reach full precision from a good start.
 _MOST_STEPS: Final = 25
-# Finite-difference step of the rate, as a share of one turn over the record.
-# The iteration stops if the rate changes, or a step improves the fit, by less than this share.
+# _SMALL: step for the numerical derivative by the rate of rotation, as a share of one revolution per record [-].
+# _LEAST_GAIN: the iteration stops if the rate or the fit changes by less than this share [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
 # A rotation about an axis cannot be determined if the squared lever arms about it are below this share of the others.
 _ALONG_AXIS: Final = 1e-6
-# Numbers of periods to try: steps of 1/20 up to two periods, then steps of 10 %.
+# Numbers of periods per record that are tried as start values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
-# Each of two criteria proposes this many parts as the next moving part.
+# Number of parts that each of two criteria proposes as the next moving part.
 _TRIED: Final = 2
 # A part is the next moving part if leaving it out reduces the unexplained displacement to this share or less.
 _MORE_RIGID: Final = 0.5
-# Unexplained sums of m r^2 below this share are ignored, which is 0.1 % of the displacements.
+# An unexplained sum of m r^2 below this share of the sum of m r^2 is ignored [-].
 _NOTHING: Final = 1e-6
-# A rotation that moves the other parts by less than this share of the part's motion is ignored,
-# because it changes the displacement by at most this share.
+# A rotation is ignored if it moves the other parts by less than this share of the moving part's motion [-].
 _NOTABLE_WAY: Final = 0.1
 # The rotation of a body is unknown if a single part has more than this share of its mass.
 _MOST_OF_BODY: Final = 0.95
@@ -171,7 +170,7 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
 
 
 def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
-    """Return, for each part left out, the sum of m r^2 of the other parts about their own centre, shape (parts,)."""
+    """Return the sum of m r^2 of all parts but one about their common centre, for each omitted part, shape (parts,)."""
     return np.asarray(
         _sum_without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
@@ -180,7 +179,7 @@ def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
 
 
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    """Estimate, for each part left out, the sum of m r^2 that no rotation of the others explains, shape (parts,).
+    """Estimate the sum of m r^2 of all parts but one that no rotation explains, for each omitted part, shape (parts,).
 
     In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
     integrals: linear in the rate, with normal equations from which one part is easily removed.
@@ -198,7 +197,7 @@ def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samp
 
 
 def _sum_without_each(terms: Samples, masses: Samples) -> Samples:
-    """Sum quadratic terms (parts, ...) over all parts but one, about the centre of the others, for each part."""
+    """Sum quadratic terms (parts, ...) over all parts but one, about their common centre, for each omitted part."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
@@ -234,7 +233,7 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
     across = np.array(
         [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    )  # the product across @ v is the cross product of axis and v
+    )  # The product ``across @ v`` is the cross product of the axis and v.
     return np.asarray(
         np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
     )
@@ -258,7 +257,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """Fit without one part: the rotation of the others, their unexplained sum, and how far the part displaces them."""
+    """The fit without one part: the rotation of the others, their unexplained sum, and how far the part moves them."""
 
     part: int
     rate: Samples

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from d2rpick.flight.body_frame import Displacements
     from d2rpick.histories.history import Momenta, Samples
 
-# Largest number of states in the integration. Positions are interpolated linearly: vibration hardly rotates a body.
+# Largest number of states in the integration, which suffices because vibration hardly rotates a body.
 _STATES: Final = 2000
-# The final angular velocity is the mean over the last 1/10 of the flight, which averages out the vibration.
+# The final angular velocity is the mean over 1 / _LAST of the flight, so that vibration is averaged out.
 _LAST: Final = 10
 
 
@@ -77,7 +77,7 @@ class Turning(NamedTuple):
         return float(np.cross(self.rate, front) @ direction)
 
     def errors_at_front(self, tr: Samples, direction: Samples) -> Samples:
-        """Return how far the node that is farthest along a unit vector (3,) at the last time is out of place then.
+        """Return the position error at the last time of the node that is then farthest along a unit vector (3,).
 
         The body is rigid from ``tr`` (k,) to the last time; the result has shape (k,) [length].
         """
@@ -202,7 +202,7 @@ def follow_turning(
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # positions of the parts according to the deck
+    )  # centre of the parts according to the deck [length]
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
     nodes = (nodes - home + middle[-1]) @ frames[-1].T
@@ -222,7 +222,7 @@ def follow_turning(
 def _integrate_velocities(
     momenta: Momenta, members: Sequence[int], mass: Samples
 ) -> Samples:
-    """Return how far parts with these columns have moved since the run began, (n, parts, 3) [length].
+    """Return how far the parts in these columns have moved since the run began, (n, parts, 3) [length].
 
     The velocity before the first state is the one of that state.
     """
@@ -255,7 +255,7 @@ def _solve_turning(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of psi: return its propagation matrix, its particular solution, and the effect of I(tr)."""
+    """Solve the equation of the rotation error psi: return propagation matrix, particular solution, effect of I(tr)."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = (
         np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))
@@ -263,7 +263,7 @@ def _solve_turning(
     )
     kept_rate = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # angular momentum in the fixed frame
+    )  # angular momentum in the fixed frame of reference
     momentum = kept_rate @ frames  # angular momentum in the frame of the body
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light

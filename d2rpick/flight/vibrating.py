@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Other parts vibrate with the chosen ones if their energy varies by more than this share of the chosen parts' range.
+# Other parts vibrate too if their energy varies by more than this share of the energy range of the chosen parts [-].
 _HARDLY: Final = 0.02
-_FEWEST: Final = 16  # fewest states from which a fall and a vibration can be separated
+# Smallest number of states from which a fall and a vibration can be separated.
+_FEWEST: Final = 16
 
 
 class Beside(NamedTuple):

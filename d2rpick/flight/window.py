@@ -16,28 +16,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# First tolerance for a free flight, as a share of the range over the record. A contact exceeds it at once.
+# First tolerance for a free flight, as a share of the range over the record [-]; a contact exceeds it at once.
 TOLERANCE = 1e-3
-# Any smooth motion obeys the law of a free flight for a moment; its misfit grows with the cube of time or faster.
-# At 1/10 of the tolerance the window of such a motion shrinks to less than half, whereas a free flight hardly shrinks.
-# Therefore the tolerance is divided by 10 while the window keeps its length, down to the resolution of the numbers.
-# A smoothly fading load shrinks the window too, until the tolerance is below the rest of the load.
+# _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
+# The reduction distinguishes a free flight from other smooth motions, whose windows shrink to less than half.
+# _STAYS: a window keeps its length if at least this share of the length remains [-].
+# _STANDS: a window shrinks at one end only if its other end moves by at most this share of the length [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# A vibration leaves at least this share of the window's misfit in its middle half (a smooth load leaves 1/8).
+# For a vibration, the middle half of a window has at least this share of its misfit [-]; a smooth load leaves 1/8.
 _RINGS = 1 / 3
-# A flight lasts for at least the share SHORTEST of the record, and has at least FEWEST states.
+# SHORTEST: a flight lasts for at least this share of the record [-].
+# FEWEST: a flight has at least this number of states.
 SHORTEST, FEWEST = 0.05, 12
-# The middle of a window, without the share _ENDS at each end, has the misfit of the free flight itself.
-# In the whole window the misfit due to printed digits, which is bounded, may be larger by the factor
-# _REACH_OF_DIGITS.
-# Any other misfit may be larger by the factor _REACH, since its maximum is taken over more states and
-# a longer time.
+# _ENDS: share of a window at each end that is not used to determine the misfit of the free flight itself [-].
+# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger in the whole window [-].
+# _REACH: factor by which any other misfit may be larger in the whole window, which has more states [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
-# Relative resolution of any quantity: solvers sum in single precision.
+# Relative resolution of any quantity [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
-# Every fifth of these times is a mark from which long flights are searched.
+# The search for long flights starts from every fifth of the times that find all flights.
 _FAR: Final = 5
-# Largest number of repetitions. A window that shrinks soon contains no contact and keeps its length.
+# Largest number of times that the ends of a window are cut off.
 _MOST_SHRINKS = 8
 
 
@@ -102,7 +101,7 @@ class Constant(Law):
         super().__init__(time)
         self.values = np.asfortranarray(
             values
-        )  # contiguous columns are faster for long windows
+        )  # Columns that are contiguous in memory are faster.
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -187,7 +186,7 @@ def _find_converged_window(
     while _is_long_enough(time, window):
         strict = _TIGHTER * limit + noise
         finer = find_longest_window(law, at, strict)
-        if enough:  # with a fading load only one end of the window moves
+        if enough:  # If a load fades, only one end of the window moves.
             ends = (find_longest_window(law, end, strict) for end in window)
             finer = max(finer, *ends, key=lambda states: _measure_length(time, states))
         share = _measure_length(time, finer) / _measure_length(time, window)
@@ -217,7 +216,7 @@ def _find_converged_window(
 
 
 def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
-    """Return True if the misfit in the middle half of a window is nearly as large as in the whole: a vibration."""
+    """Return True if the middle half of a window has nearly the misfit of the whole window, as for a vibration."""
     quarter = (window[1] - window[0]) // 4
     return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
         *window
@@ -272,7 +271,7 @@ def find_all_windows(
     for moment in list_moments(time):
         if not flights or moment > flights[-1].end:
             flight = around(moment)
-            if flight:  # within the tolerance a flight may begin some states before the previous one has ended
+            if flight:  # Because of the tolerance, flights may overlap by a few states.
                 flights.append(
                     flight._replace(start=max(flight.start, flights[-1].end))
                     if flights
@@ -342,7 +341,7 @@ def _measure_length(time: Samples, window: tuple[int, int]) -> float:
 
 
 def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
-    """Find the farthest index from ``start`` towards ``limit`` that fits: double the step, then bisect the last one."""
+    """Find the farthest index from ``start`` towards ``limit`` that fits, by doubling and bisecting the step."""
     sign = 1 if limit > start else -1
     good = start
     step = 1

@@ -20,26 +20,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Fewest states from which a load, gravity and damping can be separated: twice the number of unknowns.
+# Smallest number of states from which a load, gravity and damping can be separated, twice the number of unknowns.
 FEWEST_STATES: Final = 6
 # Relative error of the work of gravity, caused by sampling and by the sums of the solver.
-# Contacts change the work by more than this share.
+# A contact changes the work by more than this error.
 _OWN_ERROR: Final = 1e-3
-# Relative deviation from a parabola that damping may cause in the work of gravity, if no velocity is written.
+# Relative deviation of the work of gravity from a parabola that is attributed to damping [-].
 _BENT: Final = 1e-2
-# The mass follows from kinetic energy and velocity. States are left out
-# if their squared speed is below this share of the largest one.
+# States whose squared speed is below this share of the largest are not used to compute the mass [-].
 _SLOW: Final = 1e-2
-# Safety factor on that mass: a table may contain the kinetic energy of the chosen parts only.
-# A load that does work like gravity without moving the model would need a mass larger by orders of magnitude.
+# Safety factor on the mass that follows from kinetic energy and velocity [-].
+# The factor is needed because a table may contain the kinetic energy of only the chosen parts.
+# It does no harm, because other loads that do work like gravity would need a mass that is much larger.
 _MASS_ERROR: Final = 2.0
-# Tolerance for work, as a share of the range of the internal energy. A smaller deviation shows no work.
+# Deviations below this share of the range of the internal energy show no work [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number.
-# It exceeds 1 because energies, momenta and the mass computed from them are all rounded.
+# Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number [-].
+# The error exceeds 1, because energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# Losses of kinetic energy below the share _LITTLE are ignored. Losses above _MUCH are friction, not damping.
-# The momentum changes by half of that share.
+# _LITTLE: losses of kinetic energy below this share are ignored [-].
+# _MUCH: losses of kinetic energy above this share are due to friction, not damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
 # Relative error of the damped energy if it is computed from the damping rate of the vibration.
@@ -190,12 +190,12 @@ def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
     extent = min(float(np.ptp(term)) for term in terms)
     if (
         balance.internal is not None
-    ):  # a crash into a fixed wall does not change the sum
+    ):  # A crash into a fixed wall does not change the sum of energies.
         extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # The second law also allows a rate, which could hide a load, so the first law is tried before it.
+    # The first law is tried before the second, because the second has one more parameter, which could fit a load.
     exact, ringing = _make_laws_of_work(balance)
     window = find_lasting_window(exact, td, extent, noise)
     if window is None:
@@ -387,7 +387,7 @@ class _Parabola(Law):
         )
         scale = 2.0 ** (
             np.frexp(np.abs(self.energies[states]).max())[1] - 1
-        )  # Scaling by a power of 2 is exact; squares of 1e200 would overflow.
+        )  # The scale is a power of 2, so that scaling is exact.
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)

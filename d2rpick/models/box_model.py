@@ -25,7 +25,7 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# Minimum number of cells along a side: the step covers a quarter of the leading side, and at least one cell.
+# Minimum number of cells along a side, so that the step can cover a quarter of the leading side, at least one cell.
 _COARSEST = 4
 # Number of bars per cell. The cells of the leading side are listed first, then the cells of the roof.
 _BARS = 5
@@ -234,7 +234,7 @@ class Bars:
         self._stiffness, self._strength = truss.stiffness, truss.strength
         self.rest = truss.rest.copy()
         self.plastic_work = 0.0
-        # a bar pulls its first point towards its second, and vice versa
+        # A bar under tension pulls its first point towards its second point, and the second towards the first.
         self._pulls = np.zeros((points, truss.rest.size))
         self._pulls[self._first, np.arange(truss.rest.size)] = 1.0
         self._pulls[self._second, np.arange(truss.rest.size)] = -1.0

@@ -27,26 +27,25 @@ from d2rpick.models.box_model import (
     compute_stiffest_rate,
 )
 
-# Stiffness of floor and curb at one point [N/m]. They are softer than the box, so that contact does not limit
-# the time step. The weight of the box causes a penetration of 0.5 mm.
+# Stiffness of floor and curb at one point [N/m], lower than that of the box so that it does not limit the time step.
+# With this stiffness, the weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
-# Below this sliding speed, friction is proportional to the speed [m/s]. Speeds in the model are 100 times as high.
+# Below this sliding speed, friction is proportional to the speed [m/s]. Typical sliding speeds are 100 times as high.
 SLIP = 0.1
 # A point that is farther below the floor than this has left the sled and does not touch its floor [m].
 DEEPEST = 0.1
 # Thickness of the curb, which is the end of the sled [m].
 CURB_THICKNESS = 0.05
-# Upper limit of the speed towards floor, curb or ground, from which follows how long no contact is possible.
-# It is FASTEST times the initial speed, plus FALL, which is the speed after a fall of 1 m [m/s],
-# plus twice the speed of the drop.
+# No point moves faster than FASTEST times the initial speed, plus FALL, plus twice the speed of the drop.
+# This limit of the speed gives a time in which no point can reach floor, curb or ground.
+# FALL is the speed after a fall of 1 m [m/s].
 FASTEST, FALL = 4.0, 5.0
-# Contact forces that are less than this apart belong to one contact [s]: corners rattle, and a flight lasts longer.
+# Contact forces that are less than this apart belong to the same contact [s], because corners rattle.
 SAME_CONTACT = 2e-3
 
-# Safety factor on the time-step limit 2/omega, which holds for linear bars; these bars rotate, yield and touch.
+# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# A time within this share of a time step from a multiple of it is treated as the multiple,
-# because times are written as decimals.
+# A time that exceeds a whole number of time steps by less than this share of a step is rounded down [-].
 _SAME = 1e-6
 
 

@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Results are computed for this many states at once, because for single states numpy calls would take most of the time.
+# Results are computed for this many states at once, because calling numpy for single states would be slow.
 _BLOCK: Final = 256
 
-# Default output interval [s]. A period of a 400 Hz mode has 25 states, and the interval is little longer than a step.
+# Default output interval [s], which gives 25 states per period of a 400 Hz mode.
 INTERVAL = 1e-4
-# Largest number of time steps. They take minutes, and more are probably a mistake.
+# Largest number of time steps, which take minutes; a request for more is probably a mistake.
 MOST_STEPS = 5_000_000
-# Time between values of tr in a scan [s]: first while the load may last, second in the flight, third just before td.
-# In the flight the energy vibrates at 40 Hz, twice the lowest mode. Six values per period resolve this.
+# _FINE: time between values of tr in a scan while the load may last [s].
+# _COARSE: time between values of tr in the flight [s], six per energy period, which is 25 ms.
+# _LAST: time before td in which no tr is scanned [s].
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
@@ -260,7 +261,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # An overflow shows in the number of time steps, which is checked below.
+    # Overflow warnings are not needed, because an overflow would make the number of time steps too large below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -283,7 +284,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid = {motion.step_at(window.tr): window for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
-    # No warnings, because the recorder raises an error for infinite numbers.
+    # Floating-point warnings are not needed, because the recorder raises an error for infinite numbers.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
@@ -427,14 +428,14 @@ def scan(
 def _make_branches(
     motion: BoxMotion, times: Iterable[float], td: float, end: float
 ) -> Iterator[tuple[BoxMotion, float, RigidWindow]]:
-    """Yield, for each tr, a copy of the reference run advanced to it, the end of the run, and its window."""
+    """Yield, for each tr, a copy of the reference run advanced to that tr, the end time of the run, and its window."""
     for tr in times:
         run_to(motion, tr)
         yield motion.copy(), end, RigidWindow(tr, td)
 
 
 def _compute_switched_run(branch: tuple[BoxMotion, float, RigidWindow]) -> Record:
-    """Compute the switched run of a branch."""
+    """Compute a switched run that branches off from the reference run at tr."""
     return continue_motion(*branch)
 
 

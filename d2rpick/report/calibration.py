@@ -64,7 +64,7 @@ def as_csv(calibration: FittedWeights, _: DisplayOptions) -> str:
 
 
 def as_toml(calibration: FittedWeights, _: DisplayOptions) -> str:
-    """Return the file that ``--weights`` reads."""
+    """Return the TOML file that ``--weights`` reads."""
     return format_weights_as_toml(calibration.weights)
 
 

@@ -65,7 +65,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
 
 
 def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
-    """Number the reasons why verdicts are not better, so that a table can explain each below it once."""
+    """Number the reasons why verdicts are not better, so that each reason can be explained once below a table."""
     reasons = (
         decision.general_reason for decision in decisions if decision.grade != GOOD
     )
@@ -82,7 +82,7 @@ def format_with_number(decision: Decision, numbers: Mapping[str, int]) -> str:
 
 
 def list_numbered_reasons(numbers: Mapping[str, int]) -> Lines:
-    """Return the numbers in a table of verdicts, each with its reason."""
+    """Return the reasons that a table of verdicts refers to, each with its number."""
     return [(f"({number})", reason) for reason, number in numbers.items()]
 
 
@@ -117,5 +117,5 @@ def format_saving(best: Candidate) -> str | None:
 
 
 def format_saved_share(run_time_share: float) -> str:
-    """Return how much CPU time is saved if the share ``run_time_share`` of it remains."""
+    """Return how much CPU time is saved if the run takes the share ``run_time_share`` of the CPU time."""
     return f"about {1 - run_time_share:.0%} of the CPU time"

@@ -50,7 +50,7 @@ def as_table(answer: Driven, display: DisplayOptions) -> str:
 
 
 def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and rows of the flights; ``deformable`` is the deformable time of a flight."""
+    """Return the column names and rows of the flights; ``deformable`` reads the deformable time in a flight."""
     columns = {
         "flight": lambda window: window.free,
         "wait": lambda window: f"{window.wait:.4g}",

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 # Number of intervals whose lowest and highest energies are drawn, in the view and in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Separates the section, the chart of the motion and the values of a pair in ``explorer.html``.
+# Separator between the section, the chart of the motion and the values of a pair in ``explorer.html``.
 _NEXT: Final = "<!-- next -->"
 
 # Labels of the values shown for a pair, by key and in display order.
@@ -70,7 +70,7 @@ _VALUES: Final[Mapping[str, str]] = {
 }
 # Number of columns into which the view is divided to draw windows of acceptable tr. It must be a multiple of 8.
 _COLUMNS: Final = 480
-# number of significant digits of a difference
+# number of significant digits to which a difference is shown
 _READ: Final = 3
 
 

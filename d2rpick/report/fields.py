@@ -42,7 +42,7 @@ class Kind(NamedTuple):
         return next(field for field in self.fields if field.key == key)
 
 
-# Kinds that many fields use. A name with a question mark also allows None. A "size" is a non-negative number.
+# Kinds of values that many fields use. A question mark means that None is allowed. A "size" is a number >= 0.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -87,9 +87,9 @@ def row(
     closed: bool = False,
     **keywords: Any,
 ) -> Kind:
-    """Make a row of fields. Older results may lack the keys in ``later``; a ``closed`` row allows no other keys.
+    """Make a row of fields. A row that is ``closed`` allows no other keys.
 
-    ``more`` is added to its schema unchanged.
+    Results of older versions may lack the keys in ``later``; other ``keywords`` are added to the schema unchanged.
 
     Examples
     --------

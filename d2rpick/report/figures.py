@@ -40,20 +40,23 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
 NEUTRAL: Final = "#595959"
 # width of a figure in a file [inch]
 WIDTH: Final = 10.0
-# Largest width of the label of a switch time, as a share of the axes: in a file (False) and on a page (True).
+# Largest width of the label of a switch time, as a share of the axes; True stands for a page, False for a file.
 LABEL: Final = {False: 0.14, True: 0.28}
-# If the values span at least this ratio, marks at powers of ten suffice on a logarithmic axis; more marks cost time.
+# If the largest value is at least this many times the smallest, a logarithmic axis has marks only at powers of ten.
 _DECADES: Final = 100.0
-# Number of intervals whose lowest and highest values are drawn as a curve. Paper and screens show no more.
+# Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
 STRETCHES: Final = 400
-# Longest name from a file in a legend [letters]. The result contains the whole name.
+# Longest name in a legend [letters]; a longer name from a file is shortened.
 _LONGEST_NAME = 28
 
-# Width of a figure on a page [inch]. On a phone the figure fills the screen, with letters as large as in the text.
-# On a wider page its letters are no larger than in the text.
+# Width of a figure on a page [inch], chosen so that its letters on a phone are as large as those of the text.
 PAGE_WIDTH: Final = 4.5
-# Space around the panels [inch]: above for labels of switch times, between two panels, on the right for half a number,
-# below for the time axis, for each line of the legend, and next to the name of the vertical axis.
+# _TOP: space above the panels for the labels of the switch times [inch].
+# _BETWEEN: space between two panels [inch].
+# _RIGHT: space to the right of the panels for half of the last number on the time axis [inch].
+# _BELOW: space below the panels for the time axis [inch].
+# _LINE: height of a line of the legend [inch].
+# _EDGE: space next to the name of the vertical axis [inch].
 _TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
 # height of the letters of an axis name [inch]
 _NAME: Final = 0.16
@@ -82,7 +85,7 @@ def mark_span(
     colour: str = FLIGHT,
     alpha: float = 0.15,
 ) -> None:
-    """Shade a span of times, by default as a flight."""
+    """Shade a span of times, by default in the colour of a flight."""
     axes.axvspan(*span, color=colour, alpha=alpha, linewidth=0, label=label)
 
 
@@ -160,7 +163,8 @@ def show_span(
     for peak_name, highest in above:
         if highest <= scale.high:
             continue
-        early = peak_name == "load"  # the load is left, the landing right
+        # The mark of the load is on the left, and the mark of the landing is on the right.
+        early = peak_name == "load"
         note(
             axes,
             f"{peak_name}, up to {highest:.4g} \N{UPWARDS ARROW}",
@@ -328,12 +332,12 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(
             content, metadata=nothing
-        )  # `Figure.savefig` would draw the figure twice
+        )  # used because `Figure.savefig` draws a figure twice
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(
         r' (?:width|height)="[\d.]+pt"', "", element, count=2
-    )  # no width, because the page sets it
+    )  # removed because the page sets the size
     # Coordinates are rounded to 0.01 points, which is finer than any screen.
     element = re.sub(
         r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element

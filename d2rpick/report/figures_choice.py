@@ -68,7 +68,7 @@ _BEYOND_FLIGHTS: Final = 0.05
 # The label of a window contains its times if the window is at least this share of the simulated time.
 _ROOM_FOR_TIMES: Final = 0.2
 
-# Colours of windows by verdict, as in the badges on pages. Windows to be planned again or done have other colours.
+# Colours of the windows in a plan, by verdict or state.
 _COLOURS: Final = {
     "use": GOOD,
     "use with care": "#e69f00",
@@ -82,19 +82,20 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # line styles that are distinguishable without colour
-# _PLAN_HEIGHT: height of the figure in a file [inch]. _PLAN_PANEL: height of the axes on a page [inch].
+}  # hatches that distinguish the windows without colour
+# _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
+# _PLAN_PANEL: height of the axes of that figure on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn.
 _STRIP: Final = 0.07
 # Height of the energy axis, as a multiple of the largest energy shown.
 _HEADROOM: Final = 1.1
 # Largest number of parts whose energy is drawn.
-# Largest number of parts whose energy is drawn.
 _MOST_PARTS: Final = 6
-# _TRADE_HEIGHT: height of the figure in a file [inch]. _TRADE_PANEL: height of one of its axes on a page [inch].
+# _TRADE_HEIGHT: height of the figure of ``explore`` in a file [inch].
+# _TRADE_PANEL: height of each axes of that figure on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space next to the first and last td, as a share of the axes, so that lines and marks there are not cut off.
+# Space before the first td and after the last td, as a share of the axes, so that marks there are not cut off.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 # Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of one colour.
@@ -108,23 +109,25 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Largest number of runs that each have a colour and a name. If there are more, only outliers do; the others are grey.
+# Largest number of runs that are all drawn in colour with a name; if there are more, only the outliers are.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# All grey curves together are as dark as _DARK lines, and none is fainter than the opacity _FAINTEST.
+# _DARK: all grey curves together are at most as dark as this number of lines.
+# _FAINTEST: smallest opacity of a grey curve [-].
 _DARK, _FAINTEST = 10, 0.02
-# with more runs than this, lines and marks are thin
+# if there are more runs than this, their lines and marks are drawn thin
 _MANY: Final = 40
-# Time shown before the first tr (_BEFORE) and after td (_AFTER), as shares of the time between them.
+# _BEFORE: time shown before the first tr, as a share of the time from the first tr to td.
+# _AFTER: time shown after td, as a share of the time from the first tr to td.
 _BEFORE, _AFTER = 0.25, 0.15
-# height of the figure [inch]
+# height of the figure of ``study`` in a file [inch]
 _HEIGHT: Final = 4.0
-# height of a name, as a share of the axes
+# height of a run's name, as a share of the axes
 _LINE: Final = 0.055
-# the line from the curve to a name ends at the left edge of the name
+# The line that connects a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The axis need not show the lowest level if that is this many times lower than the median level.
+# The axis may omit the lowest level if the median level is more than this many times as high.
 _LOWEST: Final = 50.0
 
 
@@ -314,7 +317,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     low = min(0.0, float(shown.min(initial=0.0)))
     high = _HEADROOM * float(shown.max(initial=0.0)) or 1.0
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    # below the energies only the windows are drawn
+    # There are no axis labels below zero energy, because only the windows are drawn there.
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
     _finish_run_axes(figure, axes, *_label_run_axes(history), page=page)
     return figure
@@ -468,7 +471,7 @@ class _Named(NamedTuple):
 
 def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
     """Draw the energies of all runs around td, the tr of each run, the common tr, and td."""
-    # A layout engine is needed, because names next to the axes make the margins unknown.
+    # matplotlib has to compute the margins, because their width depends on the names next to the axes.
     figure = Figure(
         figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT),
         layout="constrained",
@@ -588,7 +591,7 @@ def _show_runs(
         np.concatenate([levels, *_select_energies(curves, *window)])
         for window in ((early, td), span)
     )
-    # keep the lowest level visible next to the median one
+    # The axis shows the lowest level too, unless it is far below the median level.
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = make_scale(float(inner.min()), float(visible_energies.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):

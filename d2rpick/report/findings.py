@@ -49,10 +49,8 @@ _NOUNS: Final = (
     "error",
     "warning",
     "info message",
-)  # nouns for the severities, in the same order
-_NOT_XML: Final = (
-    "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled at first use
-)
+)  # nouns for the severities: error, warning, info
+_NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled only when it is used
 
 _LINE: Final = get_kind("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
@@ -351,7 +349,7 @@ def _describe_windows(group: Sequence[CheckedWindow]) -> str:
 
 
 class _JudgedWindow(NamedTuple):
-    """The verdict on windows that are alike, in words, and the place of the card that opens them."""
+    """The verdict in words on windows that are alike, and the location of the card that makes the parts rigid."""
 
     verdict: str
     sentence: str
@@ -482,13 +480,13 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display, with ``/`` and without undecodable bytes; relative to ``root`` if it is in that."""
+    """Return a path for display, with ``/`` and without undecodable bytes, relative to ``root`` if it is inside it."""
     if path == STDIN:
         return path
-    absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
+    absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up
     displayed = (
         os.path.relpath(absolute, root)
-        if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118
+        if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118  pathlib would slow start-up
         else absolute
     )
     return os.fsencode(displayed).decode("utf-8", "replace").replace(os.sep, "/")
@@ -553,7 +551,7 @@ def _explain_matching_rules(
 
 
 def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
-    """Explain one rule: what it finds, why that matters, and decks that pass and fail. Lines are as wide as the cards.
+    """Explain one rule: what it finds, why that matters, and examples of decks that pass and fail.
 
     Without the decks the last line says how to print them.
     """

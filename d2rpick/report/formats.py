@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-# widest text that is easy to read [columns]; a terminal may have fewer
+# largest width of text [columns], because longer lines are hard to read
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")

@@ -109,11 +109,11 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Keys of single parts, which are no longer compared. They keep their places for a version, without values.
+# Deprecated keys of single parts, which remain without values for one version because users may read them.
 _NO_VALUE: Final = Kind({"type": "null"})
 NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
                         "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
-# All values of a candidate. In CSV the notes are the last column. Add a new measure at the end.
+# All values of a candidate. Add a new measure at the end, so that the columns of CSV files keep their order.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -158,8 +158,8 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# _OF_TR: keys that explain the choice of tr but do not rate the pair.
-# _FIRST: the ratings that ``verify`` shows first, in the order in which it shows them.
+# _OF_TR: keys that explain how tr was chosen but do not rate the pair.
+# _FIRST: keys of the ratings that ``verify`` shows first, in this order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
@@ -186,7 +186,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys that were added to ``suggest`` and ``verify`` after their first schemas. Other results always had them.
+# Keys that older results of ``suggest`` and ``verify`` lack.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -205,7 +205,7 @@ DECIDED: Final = row(
     Field("worst_residual", get_kind("number", minimum=0),
           "worst possible residual; 2 if the residual is unknown"),
 )  # fmt: skip
-# the same values for a result whose decision may be None
+# values of the decision on a pair, for a result that may have no decision
 DECISION: Final = tuple(
     field._replace(kind=maybe(field.kind), later=True)
     for field in DECIDED.of_part(lambda answer: answer.decision)

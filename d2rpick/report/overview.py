@@ -92,7 +92,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 ))  # fmt: skip
 _MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# keys of the JSON output whose value is not a list or an object
+# keys of the JSON output whose value is a single value, neither a list nor an object
 _PLAIN = (
     "format",
     "version",

@@ -40,13 +40,13 @@ _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# Characters that change the direction of the surrounding text. No page may contain them or control characters.
+# Characters that change the direction of the surrounding text; they are replaced in pages.
 _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
 _MOST_FILES: Final = 20  # largest number of files of a deck that are named
-# names of the lines of a page that are filled in by hand
+# labels of the lines on a page that the reader fills in by hand
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
@@ -126,7 +126,7 @@ def build_document(
         make_element("title", title),
         *(make_element("style", sheet) for sheet in sheets),
     )
-    # The lines are at the top, because below a long card they might be printed on a separate sheet.
+    # The lines to be signed are at the top, because below a long card they might be printed on a separate sheet.
     sign = make_element(
         "p", *(make_element("span", line) for line in signed), class_="sign"
     )

@@ -64,7 +64,7 @@ _MOST_ROWS = 20
 
 # Largest number of rows of a table in a notebook.
 _FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # without this limit a picture would fill the screen
+_WIDEST: Final = "max-width: 40em"  # largest width of a picture in a notebook
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
@@ -587,7 +587,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
     )
 
 
-# For each kind of answer, its sentences (the shortest first), and the header and rows of its table.
+# For each kind of answer, the functions that return its sentences and the header and rows of its table.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {

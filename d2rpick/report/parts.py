@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Columns of the table of sets and of the two tables of parts, as many as fit on a screen or sheet.
+# Column names of the table of sets, and of the two tables into which the columns for parts are divided.
 SETS = (
     "set",
     "parts",
@@ -342,7 +342,7 @@ def _format_position_error(part_set: PartSet) -> str:
 
 
 def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
-    """Return an error, with a sign if it is only a lower limit; "unknown" without a value, which is not zero."""
+    """Return an error as text, with ">=" if it is only a lower limit; "unknown" for None."""
     if value is None:
         return "unknown"
     sign = ">= " if part_set.position_is_lower_bound else ""

@@ -124,7 +124,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Columns that are omitted, in this order, if a terminal is too narrow; the first of all is the energy at td.
+# Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
 _SPARE: Final = ("+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -220,7 +220,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def name_target_energy(answer: StudyOfRuns) -> str:
-    """Return the head of the column of the energies at td, with their unit if all runs name it."""
+    """Return the header of the column with the energies at td, with the unit if all runs name the same one."""
     return f"E(td) [{answer.energy_unit}]" if answer.energy_unit else "E(td)"
 
 

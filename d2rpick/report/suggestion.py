@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions
 
-# largest number of windows of acceptable tr that a line names
+# largest number of windows of acceptable tr that are listed in a line of text
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
@@ -47,7 +47,7 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# _SPARE: columns that are omitted first if a table would be too wide.
+# _SPARE: columns that are omitted first if the table of candidates would be too wide.
 # _IN_FULL: columns that are shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
@@ -279,7 +279,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Describe the windows of acceptable tr: the recommended tr's window, the longest others, and the total share."""
+    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the share of all."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"

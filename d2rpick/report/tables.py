@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# If a table is too wide, long words (paths, lists of parts) are split in columns wider than _WORD.
-# If that is not enough, words longer than _LEAST are split too. No number is that long.
+# _WORD: if a table is too wide, words longer than this (paths, lists of parts) are split.
+# _LEAST: if the table is still too wide, words longer than this are split too; no number is that long.
 _WORD: Final = 32
 _LEAST: Final = 12
-# A formula begins with =, +, -, @ or, in spreadsheets of some languages, the full-width form of one of them.
-# The formula begins at the start of a cell, or after a semicolon, the cell separator in languages with a decimal comma.
-# A number is not a formula.
+# _NUMBER: pattern of a number, which is not treated as a formula.
+# _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of them.
+# A formula may follow a semicolon, because some spreadsheets use semicolons to separate the cells of a CSV file.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# A cell with more characters than this is treated as text, which is wrapped before a column is omitted.
+# A cell with more characters than this is treated as text; it is wrapped before any column is omitted.
 _TEXT: Final = 20
 
 
@@ -408,5 +408,5 @@ def _escape_letter(letter: str) -> str:
         return f"\\{letter}" if letter in "\\'" else letter
     # Bytes of a file name that are not valid text appear as lone surrogates.
     errors = "surrogateescape" if "\udc80" <= letter <= "\udcff" else "surrogatepass"
-    # Octal, because three octal digits are always complete; some shells read more than two hexadecimal digits.
+    # Octal escapes have exactly three digits, whereas some shells read more than two digits of a hexadecimal escape.
     return "".join(f"\\{byte:03o}" for byte in letter.encode(errors=errors))

@@ -51,8 +51,7 @@ COLUMNS: Final = [
 
 # A smaller relative change of the rigid time is not mentioned.
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share within these limits is described as halved.
-# If it falls further, its new value is given.
+# An error that falls to a share between these limits is described as halved; for a smaller share it is given [-].
 _HALF: Final = (0.45, 0.5)
 
 

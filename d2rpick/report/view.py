@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 # Time shown beyond each end of the flight, as a share of its length, so that load and landing are visible.
 _BEYOND = 0.06
-# The axis is logarithmic if the highest energy exceeds the level by more than this factor,
-# since the level would not be visible otherwise. A logarithmic axis begins at the level divided by this factor.
+# LOGARITHMIC: the energy axis is logarithmic if the highest energy exceeds the target energy by more than this factor.
+# BELOW_LEVEL: a logarithmic energy axis begins at the target energy divided by this factor.
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# space above and below the curve, as a share of the curve's height
+# Space above and below the curve, as a share of the curve's height.
 _ROOM = 0.08
 # Share of a flight at each of its ends that is ignored, because the load or the landing may still act there.
 _UNSURE = 0.01

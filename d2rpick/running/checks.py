@@ -43,7 +43,7 @@ def check_driven(
     limits: Limits,
     wait: float | None,
 ) -> None:
-    """Check that a Radioss run can be driven.
+    """Check that `drive` can drive a Radioss run.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches its parts by itself: compute a leg, read its history, choose the next leg."""
+"""Drive a Radioss run that switches its parts by itself, one leg (engine run) after the other."""
 
 from __future__ import annotations
 
@@ -44,10 +44,9 @@ if TYPE_CHECKING:
 
 JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
-# With it a rigid leg costs a few percent of a deformable one, and its history has enough states to show a contact.
+# With this time step, a rigid leg costs a few percent of a deformable leg, and its history still shows a contact.
 _STEP_RATIO: Final = 5.0
-# A flight shorter than the wait (the force-free time that shows a flight) is reported if it lasted for at least
-# this share of the wait.
+# A flight that is too short to be switched is reported if it lasts for at least this share of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without output after which the silence of the solver is reported [s].
@@ -103,7 +102,7 @@ class Driver:
         D2RPickError
             If the starter fails.
         """
-        self._wait_for_end()  # an earlier driver may have left a solver running
+        self._wait_for_end()  # An earlier driver may have left a solver running.
         if self.journal.has("prepared") and self.solver.whole(0):
             return
         # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
@@ -154,7 +153,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg. If the restart from which it begins is damaged, go back leg by leg to a complete one."""
+        """Choose the next leg. If its restart file is damaged, go back leg by leg to a complete restart file."""
         while True:
             legs = self.journal.legs
             order = choose_next_leg(legs, self.limits)
@@ -207,7 +206,7 @@ class Driver:
             raise
 
     def _find_problem(self, order: Order) -> str:
-        """Say why a leg is not done; "" if it ended normally, with complete restarts and a history up to its end."""
+        """Return why a leg has failed; "" if it ended normally, with complete restart files and a complete history."""
         number = order.number
         if not self.solver.ended_well(number):
             return f"the solver failed: {self.solver.last_words(number)}; continue with --resume"
@@ -219,7 +218,7 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Note that a leg has failed, so that it is computed again.
+        """Write to the journal that a leg has failed, so that the leg is computed again.
 
         If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
         back by the leg that wrote it.
@@ -262,7 +261,7 @@ class Driver:
                 self.told(f"warning: out-of-place: {window.warning}")
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
-            # The restart before the window is needed if the window is dropped.
+            # The restart file from before the window is needed if the window is not used after all.
             kept_restarts.add(first.number - 1)
         self.solver.keep(kept_restarts)
 
@@ -277,7 +276,7 @@ def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
-    """Return the longest wait among the legs that ended before a time and in which something vibrated [time]."""
+    """Return the longest waiting time of the legs that ended before a given time and in which parts vibrated [time]."""
     waits = [
         leg.findings.wait or 0.0
         for leg in legs
@@ -335,7 +334,7 @@ class Observer:
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
-        # Flights that were a little too short to be switched.
+        # Flights that were slightly too short to be switched.
         short_flights = tuple(
             (start, end)
             for start, end in self._evidence.pauses(order.start)
@@ -366,7 +365,7 @@ def _choose_end(order: Order, history: History, free: float) -> float:
 
 
 class Journal:
-    """Records that are only appended, each on the disk when `add` returns.
+    """The journal of a driven run. Records are only appended, and each is on the disk when `add` returns.
 
     A cut or damaged line is ignored: what it reports is done again.
     """
@@ -381,7 +380,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, including discarded ones, without the legs that a restart from an earlier time has undone."""
+        """Computed legs, without the legs that were undone by a restart from an earlier time."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":

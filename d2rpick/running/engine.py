@@ -45,18 +45,20 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# Errors in the listing of a starter are followed by much output, so more bytes are read from its end (_LISTING_SIZE).
-# _ERROR: the characters with which an error begins. _ERROR_LINES: the number of lines of an error.
+# _LISTING_SIZE: number of bytes read from the end of a starter's listing, where much output follows the errors.
+# _ERROR: characters with which an error in a listing begins.
+# _ERROR_LINES: number of lines of an error in a listing.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
 # A restart file is complete if it has at least this share of the size of the starter's restart file.
 _WHOLE: Final = 0.98
-# _TIME_TO_STOP: time that a solver is given to stop [s]. _PAUSE: time between two checks [s].
+# _TIME_TO_STOP: time that a solver is given to stop by itself [s].
+# _PAUSE: time between two checks whether the solver has stopped [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
-    """The commands that start starter and engine (None: those of the installation), and the number of threads."""
+    """The commands of starter and engine, by default those of the installation, and the number of threads."""
 
     starter: str | None = None
     engine: str | None = None
@@ -96,7 +98,7 @@ class Commands(NamedTuple):
         ]
 
     def missing(self) -> str:
-        """Return the first program that cannot be started, or "" if all can; errors as `words`."""
+        """Return the first program that cannot be started, or "" if all can be started."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -165,7 +167,7 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
-        self._signal = 0  # signal that ended the last process, or 0
+        self._signal = 0  # number of the signal that ended the last process, or 0
 
     def file(self, number: int, suffix: str) -> Path:
         """Return the path of a file of a leg; leg 0 is the starter."""
@@ -307,7 +309,7 @@ class Solver:
                 path.unlink()
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for leg ``number``, before which ``share`` of the run remains."""
+        """Raise D2RPickError if the disk has no room for leg ``number``; ``share`` of the run remains to compute."""
         written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
         to_come = round(written * share / max(1 - share, 0.1))
         needed = 2 * self._measure_largest_restart() + to_come
@@ -333,7 +335,7 @@ class Solver:
         return max(sizes, default=0)
 
     def _list_status(self, pattern: str) -> list[os.stat_result]:
-        """Return the status of the files whose name is that of the run with a pattern."""
+        """Return the status of the files whose names match the run's name followed by a pattern."""
         paths = self.folder.glob(f"{self.name}{pattern}")
         return [path.stat() for path in paths if path.exists()]
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     # Events of past flights, keyed by the start of the flight and the time at which it was seen.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
 
-# tr is good if the internal energy is at least this far from its minimum within one wait, as a share of its range.
-# In computed runs a tr in a trough kept half of the energy that td should have, a tr at a peak at least 0.9 of it.
+# tr is good if the internal energy is above its recent minimum by at least this share of its recent range [-].
+# In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak at least 90 %.
 _HIGH: Final = 0.75
 
 
@@ -66,7 +66,7 @@ def find_events(
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(history, flight, decided)
     for start, _, end in rigid_times:
-        # No switch is advised where parts are rigid already.
+        # No switch is advised if the parts are rigid already.
         events = [
             event
             for event in events
@@ -83,7 +83,7 @@ def find_events(
 def _describe_rigid_times(
     history: History, rigid_times: Sequence[tuple[float, float, float]]
 ) -> Iterator[Event]:
-    """Yield the events at which parts become rigid or deformable; bodies that are always rigid have none."""
+    """Yield the events at which parts become rigid or deformable, except for bodies that are always rigid."""
     for start, seen_at, end in rigid_times:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
             continue

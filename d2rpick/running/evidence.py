@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-# Largest number of states before and in a flight from which gravity is determined.
+# Largest number of states from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
 
 
@@ -51,7 +51,7 @@ class GrowingEvidence:
         self.motion = InnerMotion(self, given, of_deck, before)
         self._record = GrowingRecord()
         self._witnesses: list[GrowingWitness] = []
-        # The evidence that still grows, by the numbers of its parts in the momenta; None for the whole model.
+        # Evidence that still grows, keyed by the momentum columns of its parts; None stands for the whole model.
         self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved = RunningMaximum()
@@ -67,7 +67,7 @@ class GrowingEvidence:
 
     @property
     def witnesses(self) -> list[GrowingWitness]:
-        """Evidence of each set of parts, and at last of the model if it has a momentum or contact energy."""
+        """Evidence of each set of parts, followed by that of the model if its momentum or contact energy is written."""
         return sorted(self._witnesses, key=_is_of_model)
 
     def take(self, states: History) -> None:
@@ -144,7 +144,7 @@ class GrowingEvidence:
             self._going_on.pop(key, None)
 
     def flights(self) -> tuple[Quiet, ...]:
-        """Return all flights that lasted for their wait, in ascending order.
+        """Return all flights that lasted for their required force-free time, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
@@ -166,7 +166,7 @@ class GrowingEvidence:
     def _find_gravity(
         self, witness: GrowingWitness, first: int, last: int
     ) -> float | None:
-        """Return the gravity between two states of some evidence, as `Laws.gravity`; None if a support holds parts.
+        """Return the gravity between two states as `Laws.gravity` returns it; None if a support holds parts.
 
         Only states up to the last one are used, and of a long record only some.
         """
@@ -182,7 +182,7 @@ class GrowingEvidence:
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # A fit would find the rounding errors of a constant momentum.
+            return 0.0  # For a constant momentum, a fit would treat rounding errors as gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(states.index(start), len(states) - 1)
 
@@ -202,7 +202,7 @@ class GrowingEvidence:
         return ()
 
     def find_contact(self, fewest: int = FEWEST) -> float | None:
-        """Return the first state at which a force acts [time]; None if none does. The record begins without a force.
+        """Return the time of the first state at which a force acts [time]; None if no force acts.
 
         A witness is used if it has at least ``fewest`` states from the first one of the record on.
         """
@@ -236,7 +236,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
-    """Return a flight whose own evidence ended at ``last_time`` with the end that other evidence shows."""
+    """Return a flight whose evidence ended at ``last_time``, with the end of the flight that other evidence shows."""
     if flight.end is not None:
         return flight
     ends = (
@@ -249,12 +249,12 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
 
 
 def _is_of_model(witness: GrowingWitness) -> bool:
-    """Return True if evidence is of the whole model, which is used after that of parts."""
+    """Return True for evidence of the whole model, which is used after the evidence of parts."""
     return witness.parts is None
 
 
 def _sample_states(first: int, last: int) -> Samples:
-    """Return the states from ``first`` to ``last``, or some of them if there are too many."""
+    """Return the states from ``first`` to ``last``; if there are too many, a uniform selection of them."""
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
 
 

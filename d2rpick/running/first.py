@@ -46,15 +46,14 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
-# The OpenRadioss starter reads /RBODY/OFF from this many engine files. A leg after the end of the run takes one step.
+# Number of engine files from which the OpenRadioss starter reads /RBODY/OFF.
 _MOST_LEGS: Final = 9
-# While the parts are rigid, the largest time step is the wait (the force-free time that shows a flight)
-# divided by this number.
-# A contact is therefore noticed at most one such step late.
+# The largest time step while the parts are rigid is the force-free time that shows a flight, divided by this number.
+# A contact is therefore detected at most one such time step late.
 _STEPS_PER_WAIT: Final = 300
-# LS-DYNA: after a switch no contact releases the parts for a time of the wait divided by this number.
+# In LS-DYNA, contacts are ignored after a switch for the required force-free time divided by this number.
 _DELAYS_PER_WAIT: Final = 100
-# Radioss: loads that act without a contact.
+# Radioss keywords of loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
 _OF_ALL: Final = (
@@ -76,15 +75,16 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
-# LS-DYNA. _PUSHES: keywords of loads that act without a contact. _OF_GRAVITY: those among them that define gravity.
+# _PUSHES: first letters of the LS-DYNA keywords of loads that act without a contact.
+# _OF_GRAVITY: first letters of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA: offset before a contact, in thicknesses of the thickest shell.
-# It must exceed the contact thickness, which is half of the thickness of each shell.
+# Gap in LS-DYNA at which the parts become deformable before a contact, as a multiple of the largest shell thickness.
+# The gap must exceed the contact thickness, which is half of the thickness of each of the two shells.
 _OFFSET_THICKNESSES: Final = 2
 
 
 class First(NamedTuple):
-    """A card for the first run, its wait, and notes for the user."""
+    """A card for the first run, its waiting time (the force-free time that shows a flight), and notes for the user."""
 
     card: PrintedCard
     wait: Wait
@@ -135,7 +135,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given wait, or half of the longest period in the deck; raise ArgumentError without either."""
+    """Return the given waiting time, or half of the longest period in the deck; raise ArgumentError without either."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
@@ -197,7 +197,7 @@ class _Sensors(NamedTuple):
 def _write_sensors(
     contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
 ) -> _Sensors:
-    """Write a sensor that detects a contact force within the wait, and a sensor that detects a flight."""
+    """Write a sensor that detects a contact force within the waiting time, and a sensor that detects a flight."""
     forces = [
         write_force_sensor(number, *contact, wait)
         for number, contact in enumerate(contacts, start=first_id)
@@ -242,7 +242,7 @@ def _write_legs(
 
 
 def _explain_wait(wait: Wait) -> str:
-    """Return the note on the wait, the force-free time that shows a flight."""
+    """Return the note on the waiting time, which is the force-free time that shows a flight."""
     return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 

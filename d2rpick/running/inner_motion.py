@@ -1,4 +1,4 @@
-"""Determine the wait, the force-free time that shows a flight, from the inner oscillations of the body.
+"""Determine the waiting time (the force-free time that shows a flight) from the inner oscillations of the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
 
-# A change of velocity is an oscillation if it exceeds this share of the range so far.
+# A change of velocity is an oscillation if it exceeds this share of the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: share of an oscillation at each end that is not used to measure it, since its ends may be flat.
-# _INNER_TIME: share of half its period that a harmonic motion takes for the rest.
+# _INNER: share of the change in a half period, at each end, that is not used to measure the half period [-].
+# _INNER_TIME: share of half its period that a harmonic motion takes for the middle part of the change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# An oscillation whose mean force is below this share of the strongest one so far is a rotation of the body.
+# An oscillation is treated as a rotation of the body if its mean force is below this share of the largest so far [-].
 _ROTATION: Final = 0.05
-# A change within fewer states is a jump, not an oscillation, such as the jump of an energy after the first state.
+# A change within fewer states than this is treated as a jump, not as an oscillation.
 _FEWEST_STATES: Final = 4
-# A part oscillates only if its relative velocity exceeds this share of the velocity of all parts.
+# A part oscillates only if its relative velocity exceeds this share of the velocity of all parts [-].
 _AT_REST: Final = 1e-3
-# How an oscillation ends is unknown once it lasts this many times the longest half period before it.
+# The end of an oscillation is unknown once it lasts this many times as long as the longest earlier half period [-].
 _MUCH_LONGER: Final = 2.0
-# Longest oscillations, in half periods according to the deck. A longer one is a rotation of the body.
-# _LONGEST_FREE is for free oscillations, _LONGEST_PUSHED for those under a load.
+# _LONGEST_FREE: a longer free oscillation, in half periods according to the deck, is a rotation of the body [-].
+# _LONGEST_PUSHED: a longer oscillation under a load, in half periods according to the deck, is a rotation too [-].
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# Periods are uncertain by 10 %, so a given wait may be as short as this share of half the period.
+# A given waiting time must be at least this share of half the longest period [-], which is uncertain by 10 %.
 _EXACT: Final = 0.9
-# Parts with a smaller share of the mass hardly move the other parts.
+# Parts with less than this share of the mass are ignored [-], because they hardly move the other parts.
 _HEAVY: Final = 0.05
-# Internal energy below this share of the largest energy is round-off, so there is no vibration.
+# An internal energy below this share of the largest energy is round-off and shows no vibration [-].
 _ROUND_OFF: Final = 1e-6
 
 
@@ -82,12 +82,13 @@ class _Motion:
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
-        self.has_free_swing = False  # True after an oscillation without a push
-        # The first half period is empty: it ends when the motion is first seen.
+        self.has_free_swing = False  # True once an oscillation without a push was seen
+        # The first half period has no duration; it ends when the motion is first seen.
         self._swings: list[_HalfPeriod] = []
-        self._columns = GrowingColumn()  # time, value, and least change that is a swing
+        # The columns are time, value, and the smallest change that is an oscillation.
+        self._columns = GrowingColumn()
         self._highest, self._lowest = RunningMaximum(), RunningMaximum()
-        # States at the last turning point and at the extreme value since then, and 1 if values rise, -1 if they fall.
+        # State at the last turning point, state at the extreme since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
     def covers(self, now: float) -> bool:
@@ -144,7 +145,7 @@ class _Motion:
         return self._swings[-1]
 
     def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
-        """Return True if the swing that goes on is much longer than all before it, and is no rest or rotation.
+        """Return True if the current oscillation is much longer than all earlier ones and is neither rest nor rotation.
 
         The mean change by time of a rotation is below ``least_strength``.
         """
@@ -165,9 +166,9 @@ class _Motion:
 
 
 class Evidence(Protocol):
-    """What the inner motion needs of the evidence of a growing record."""
+    """The part of the evidence of a growing record that is needed to follow inner motion."""
 
-    # Slices of the latest states, each with the numbers of the parts that move in it; () if momenta are missing.
+    # Slices of the latest states, each with the column numbers of the parts that move in it; () without momenta.
     moving: list[tuple[slice, tuple[int, ...]]]
 
     @property
@@ -179,7 +180,7 @@ class Evidence(Protocol):
 
 
 class _Longest(NamedTuple):
-    """The longest half period known ``since`` a time: its source, and its end ``over`` [time].
+    """The longest half period, its source, its end ``over``, and the time ``since`` when it has been known [time].
 
     ``strength`` is the strongest mean change by time so far, ``swing`` half of the longest swing, pushed or not [time].
     """
@@ -193,7 +194,7 @@ class _Longest(NamedTuple):
 
 
 class InnerMotion:
-    """The wait at each state of a record, from the inner motion up to that state.
+    """The waiting time at each state of a record, from the inner motion up to that state.
 
     ``evidence`` shows which parts move, and since when no force has acted.
     ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
@@ -217,7 +218,7 @@ class InnerMotion:
         self._going_on: dict[tuple[int, int], _Motion] = {}
         self._heavy: tuple[int, ...] = ()
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
-        # Time from which on the motions of parts count, no longer that of the energy [time].
+        # Time from which the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
         # Longest half periods in the order in which they became known.
         self._longest_of_parts = [_Longest(-np.inf)]
@@ -275,7 +276,7 @@ class InnerMotion:
     def _learn(
         self, swing: _HalfPeriod, motion: _Motion, so_far: list[_Longest]
     ) -> None:
-        """Lengthen the wait if a completed half period requires it, unless this was a rotation or disturbed by a push.
+        """Lengthen the waiting time if a completed half period requires it and was neither a rotation nor pushed.
 
         A pushed swing counts if there is no deck and this motion has not swung without a push before.
         """
@@ -296,7 +297,7 @@ class InnerMotion:
         so_far.append(longest)
 
     def wait(self, start: float, now: float) -> Wait | None:
-        """Return the wait of a flight since ``start``, from the states up to ``now`` [time]; None if it is unknown."""
+        """Return the waiting time for a flight since ``start``, from the states up to ``now``; None if unknown."""
         longest = self.longest(now)
         if self._given is not None:
             reason = "as given"
@@ -369,7 +370,7 @@ def wait_of_deck(inventory: Inventory) -> Wait | None:
 
 
 def check_wait(given: float, longest: Wait | None, name: str) -> None:
-    """Raise RangeError if a given wait is shorter than half of a known period."""
+    """Raise RangeError if a given waiting time is shorter than half of a known period."""
     if longest is None:
         return
     shortest = longest.time if longest.least is None else longest.least

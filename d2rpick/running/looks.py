@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-# A record with fewer states is read completely, since early results may change, such as which parts are springs.
+# A record with fewer states than this is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
@@ -124,7 +124,7 @@ class Looks:
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
-    """Return where to continue in the files of a run; {} if one format is always read completely."""
+    """Return where to continue in the files of a run; {} if a file has a format that is always read completely."""
     points: dict[str, ResumePoint] = {}
     for database in run.databases:
         points_of_format = database.find_resume_points()

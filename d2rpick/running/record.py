@@ -18,12 +18,11 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Number of rows for which a new column has room.
+# Number of rows for which a new column reserves memory.
 _FEWEST_ROWS: Final = 64
-# Two states whose times differ by more than this many units of the last printed digit are different.
+# Two states are different if their times differ by more than this many units of the last printed digit.
 _APART: Final = 1.5
-# Tolerance for values that are read twice, as a share of the largest value. A sum over parts may end in other digits.
-# The energy of springs is left out of an energy only if springs have energy in the states that are read together.
+# Tolerance for a value that is read twice, as a share of the largest value [-]; sums over parts may be rounded.
 _SAME: Final = 1e-9
 
 
@@ -52,7 +51,7 @@ class GrowingColumn:
 
 
 class RunningMaximum:
-    """The largest of all values so far, by which a limit at a state depends on no later one."""
+    """The largest of all values so far, used for limits at a state that must not depend on later states."""
 
     def __init__(self) -> None:
         self._last: NDArray[Any] | None = None
@@ -70,7 +69,7 @@ class GrowingRecord:
 
     def __init__(self) -> None:
         self._latest_tables: list[Table] = []
-        # By the number of a table and the name of a column.
+        # Columns, keyed by the number of their table and by their name.
         self._columns: dict[tuple[int, str], GrowingColumn] = {}
         self._history: History | None = None
 
@@ -132,7 +131,7 @@ def _drop_unsettled(table: Table) -> Table:
 
 
 def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; for an empty table, the last state in the tables ``before``."""
+    """Return the last state of each table of a history; for an empty table, the last state of that table ``before``."""
     last_states: list[Table] = []
     tables = _list_tables(history)
     for table, last_state in zip(tables, before or tables, strict=True):
@@ -160,7 +159,7 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
 
 def _contains(table: Table, state: int, last_state: Table) -> bool:
-    """Return True if a state of a table, -1 if there is none, has the values of the last known state."""
+    """Return True if a state of a table has the values of the last known state; ``state`` is -1 if there is none."""
     columns, last_values = list_columns(table), list_columns(last_state)
     if state < 0 or columns.keys() != last_values.keys():
         return False

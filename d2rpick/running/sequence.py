@@ -16,32 +16,33 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Kinds of legs. "load": deformable. "probe": rigid, and the flight may end in it.
-# "rigid": a probe that is computed again, up to td, which is then known.
+# The kinds of a leg (an engine run of Radioss) are the following three.
+# LOAD: the parts are deformable.
+# PROBE: the parts are rigid, and the leg continues until it shows the contact that ends the flight.
+# RIGID: the parts are rigid, and the leg ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Two times are equal if they differ by less than this number of states: a history may end one state early.
+# Two times are equal if they differ by less than this many output intervals, because a history may end one early.
 _STATES: Final = 1.5
-# Once only this many numbers of legs are left, no further flight is switched, so that the run reaches its end.
+# No further flight is switched once only this many leg numbers are left, so that the run can reach its end.
 _KEPT_BACK: Final = 10
-# Shortest deformable leg in a flight, as a share of the wait (the force-free time that shows a flight).
-# tr is the start or the end of this leg, whichever has the higher energy.
+# Shortest deformable leg in a flight, as a share of the force-free time that shows a flight [-].
 _LEAST: Final = 0.25
-# Length of a deformable leg while the wait (see _LEAST) is unknown, as a share of the run.
+# Length of a deformable leg while the period of the vibration is unknown, as a share of the run [-].
 _UNKNOWN: Final = 0.02
-# Smallest length of a probe, as a share of its rigid time so far (_OF_FLOWN) and of the run (_OF_RUN).
-# A longer probe computes more after the contact, and a shorter one needs more restarts.
-# Either costs a few percent of a deformable flight.
+# A longer probe computes more after the contact, and a shorter probe needs more restarts.
+# _OF_FLOWN: smallest length of a probe as a share of its rigid time so far [-].
+# _OF_RUN: smallest length of a probe as a share of the run [-].
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
-# Assumed cost of writing and reading a restart, in deformable cycles (measured: about 5).
+# Assumed cost of writing and reading a restart file, in deformable cycles; about 5 were measured.
 _RESTART: Final = 10
-# Shortest flight that is switched, in half periods of its slowest vibration.
-# A vibrating body touches the ground at another time than a frozen one.
-# After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 and 55 ms late.
-# After flights of 3.2 half periods and more, cars and boxes landed within 3.4 ms.
+# Shortest flight that is switched, in half periods of its slowest vibration [-].
+# In shorter flights, freezing the vibration changes the time of the landing too much.
+# After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
+# After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
 _SWINGS: Final = 3.0
-# Smallest share of a deformable run that a window must save.
-# A window moves its own landing by up to 2 ms and the next one by up to 37 ms (two computed boxes).
+# Smallest share of the cost of a deformable run that a window must save [-].
+# Smaller savings are not worth the change of later landings, which was up to 37 ms in two computed boxes.
 _WORTH: Final = 0.04
 
 
@@ -187,7 +188,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     D2RPickError
         If the solver has no number for one more leg.
     """
-    if not legs:  # So many states show whether parts at rest fall.
+    if not legs:  # This leg has enough states to show whether parts at rest fall.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last, findings = legs[-1].order, legs[-1].findings
     if findings.contact is not None:
@@ -219,7 +220,7 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
     if not switches:
         return _order_load(last, findings, limits)
     if not findings.idle and findings.tr <= last.start:
-        # The energy was higher at the start of the leg, so the probe replaces the leg.
+        # The energy was higher at the start of the leg, so the probe begins there and replaces the leg.
         last = last._replace(number=last.number - 1, until=last.start)
     return _order_probe(last, legs, limits)
 
@@ -230,7 +231,7 @@ def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Order a deformable leg that ends as soon as a current or past flight has been long enough."""
+    """Order a deformable leg that ends as soon as a current or past flight has lasted for the required time."""
     now, end = last.until, limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
@@ -309,7 +310,7 @@ def _explain_too_little_saved(
     """
     if td <= tr:
         return "its margin begins before tr"
-    cost, cycles, length = 0.0, 0, 0.0  # cost in deformable cycles
+    cost, cycles, length = 0.0, 0, 0.0  # The cost is counted in deformable cycles.
     for leg in legs:
         if not leg.order.rigid:
             cycles += leg.cycles or 0
@@ -339,7 +340,7 @@ def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return what was known about the flight when it was switched, at the end of the last deformable leg."""
+    """Return the findings about the flight at the end of the last deformable leg, when the flight was switched."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 

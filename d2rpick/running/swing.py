@@ -1,4 +1,4 @@
-"""Warn about parts that oscillate so much that their body should not become rigid, before td is known."""
+"""Warn, before td is known, about parts that oscillate so much that their body should not become rigid."""
 
 from __future__ import annotations
 

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.running.events import Decided
 
-# Share of a processor core that reading may take.
+# Largest share of the time of a processor core that reading may take [-].
 _SHARE: Final = 0.01
-# _SHORTEST: shortest pause between two reads [s]. _LONGEST: longest pause if only new states are read [s].
+# _SHORTEST: shortest pause between two reads [s].
+# _LONGEST: longest pause between two reads that cover only new states [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run that writes nothing for this time is silent [s].
 _SILENT: Final = 60.0
@@ -40,7 +41,7 @@ _NO_EVIDENCE: Final = (
 
 
 class WatchedFile(NamedTuple):
-    """What changes when a file is written: its number, its size, and the time at which it was ``written`` [s]."""
+    """Identity of a watched file: its number, its size, and the time at which it was ``written`` [s]."""
 
     number: int
     size: int
@@ -95,7 +96,8 @@ class Watch:
                 yield from self._read([*files])
                 self._error = None
             except (FormatError, HistoryError) as error:
-                self._error = error  # The solver may just be writing the file.
+                # The error is not raised, because the solver may be writing the file at this moment.
+                self._error = error
                 self._looks = Looks(*self._of_looks)
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
@@ -114,7 +116,7 @@ class Watch:
         return self._looks.grow
 
     def state(self) -> Event:
-        """Return whether the parts fly now, and since when."""
+        """Return a sentence on whether the parts fly now, and since when."""
         time, message = None, "no flight yet"
         if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"

@@ -28,21 +28,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-    # Returns the wait of a flight since ``start``, from the states up to ``now``; None if it is unknown.
+    # Function that returns the waiting time for a flight since ``start``, from the states up to ``now``, or None.
     Needed = Callable[[float, float], Wait | None]
 
-# A momentum or contact energy is constant within this share of its largest value so far.
-# Sums in single precision have errors of 1/10 of this.
+# A momentum or contact energy is constant if it changes by less than this share of its largest value so far [-].
+# The limit is 10 times the error of sums in single precision.
 CONSTANT: Final = 1e-4
-# After a force other than gravity, the next test waits for this share of the force-free time so far.
+# Time from one test for a force to the next, as a share of the force-free time so far [-].
 _TEST_AGAIN: Final = 0.25
-# A long interval is compared with the law at this many states. More are not needed,
-# because a force changes the momentum permanently.
+# Number of states at which a long window is compared with the law, which suffices as a force has a lasting effect.
 _MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """A flight: a force-free time that lasted for its wait.
+    """A flight, which is a force-free time that lasted for the required time.
 
     Attributes
     ----------
@@ -111,7 +110,8 @@ class GrowingWitness:
         self._laws: list[tuple[Law, Samples]] = []
         # For each state, True if the printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
-        self._start = 0.0  # of the force-free time at the last examined state
+        # Start of the force-free time that lasts at the last examined state [time].
+        self._start = 0.0
         self._examined_count = self._test_again_at = 0
 
     @property

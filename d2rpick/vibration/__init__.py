@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 def find_models(
     history: History, flight: Span, settled: Span, *, together: VibratingTogether
 ) -> dict[str, SignedModel]:
-    """Search for models of the whole energy in a ``flight``, best first, until one gives the sign; return them by name.
+    """Search for models of the energy in a ``flight``, best first, until one gives the sign of the deformation.
 
     Swings are counted in the flight from when the energy has ``settled``, which may be before it.
     """
@@ -77,7 +77,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # The modes may be so uncertain that counted swings, if there are any, are more accurate.
+        # If the modes are very uncertain, counted half cycles of the energy may be more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])
@@ -114,7 +114,7 @@ def _find_swings(history: History, first: float, last: float) -> Swings | None:
 
 
 def _rely_on_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Use uncertain or doubtful modes, with a wide error band, only if no other model gives the sign."""
+    """Use uncertain modes, with a wide error band, only if no other model gives the sign of the deformation."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:
         return found

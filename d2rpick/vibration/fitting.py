@@ -30,47 +30,48 @@ if TYPE_CHECKING:
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 
-VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
+# Numbers of free parameters of the three models: vibration, with plastic work, and with a preload.
+VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6
 
-# Parameters of the matrix pencil, first the numbers of exponentials in q**2 that are tried.
-_ORDERS: Final = (
-    3,
-    4,
-    6,
-)  # for a plain vibration, with plastic work, and with a preload
-_LAGS: Final = 64  # window of the pencil [cells]: with 1/3 of _MIN_CELLS, noise causes the least error
+# Numbers of exponentials in q**2 that the matrix-pencil method tries, one for each of the three models.
+_ORDERS: Final = (3, 4, 6)
+# Window length of the matrix-pencil method [cells], 1/3 of _MIN_CELLS so that noise causes the smallest error.
+_LAGS: Final = 64
+# Smallest number of cells into which the record is divided.
 _MIN_CELLS: Final = 192
-_MAX_CELLS: Final = 8192  # limits memory to 5 MB; enough for 1000 periods of the energy
-_CELLS_PER_PERIOD: Final = 24  # fewest cells per period of the strongest vibration in E; a preload adds a slower one
+# Largest number of cells into which the record is divided, so that the method needs at most 5 MB of memory.
+_MAX_CELLS: Final = 8192
+# Smallest number of cells per period of the strongest oscillation of the energy.
+_CELLS_PER_PERIOD: Final = 24
 
-# Limits of the least-squares fit.
-COARSE: Final = 400  # number of samples for comparing and first refining the starts
-_MEDIUM: Final = (
-    2048  # number of samples on which a fit may be refused before all samples are used
-)
-_NEAR: Final = 1e-6  # a smaller relative gain cannot change a refusal
-MAX_MISFIT: Final = 0.4  # largest rms misfit over std(E): 16 % of the variance or more can hide another mode
-_FAR_TOO_MUCH: Final = (
-    1.2  # safety factor: the variance of 2,000 samples is known to 3 %
-)
-STARTS: Final = 3  # most starts to refine; the first may not be the best
-CERTAIN: Final = (
-    0.01  # unexplained share of the variance below which no second start is tried
-)
+# Number of samples with which start values are compared and first refined.
+COARSE: Final = 400
+# Number of samples with which a fit may be refused before all samples are used.
+_MEDIUM: Final = 2048
+# The refinement stops if it reduces the misfit by less than this share [-].
+_NEAR: Final = 1e-6
+# Largest rms misfit relative to the standard deviation of the energy [-]; a larger misfit may hide another mode.
+MAX_MISFIT: Final = 0.4
+# Safety factor on the largest variance of the misfit if only some of the samples are used [-].
+_FAR_TOO_MUCH: Final = 1.2
+# Largest number of start values that are refined, because the first may not be the best.
+STARTS: Final = 3
+# No second start value is tried if the first one leaves less than this share of the variance unexplained [-].
+CERTAIN: Final = 0.01
 _MAX_STEPS: Final = 40
-# A fit to some of the samples is a drift if it has less than 1/10 period in the record. Of 1,100 such fits, none
-# reached 1/3 of a period or followed the samples better when it was refined with all samples.
+# A fit to some of the samples is a drift, not a vibration, if it has less than 1/10 period in the record [rad].
+# None of 1,100 such fits became a vibration when it was refined with all samples.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
-# A parameter with smaller derivatives (for energies of about 1) has no effect, and their squares underflow.
+# A parameter has no effect if the derivatives of the scaled energy with respect to it are smaller than this [-].
 _NO_EFFECT: Final = 1e-100
-MAX_STRUCTURE: Final = (
-    0.02  # share of std(E), 30 times what one real solver leaves with one mode
-)
-# A misfit has structure if its covariance is this many standard deviations above white noise, and clear structure
+# Largest part of the misfit that neighbouring samples share, relative to the standard deviation of the energy [-].
+MAX_STRUCTURE: Final = 0.02
+# A misfit has structure if its covariance exceeds that of white noise by this many standard deviations.
 _DEVIATIONS: Final = 3.0
+# The structure of a misfit is certain if its covariance exceeds that of white noise by this many standard deviations.
 _BEYOND_DOUBT: Final = 6.0
-# Structure further above white noise than this, in standard deviations, is certain.
+# All samples would refuse a fit if the structure with few samples exceeds MAX_STRUCTURE by this factor [-].
 _BEYOND_STRUCTURE: Final = 2.0
 
 
@@ -95,11 +96,11 @@ def fit_few(
 def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
-    """Fit all samples, starting from the parameters of `fit_few`; None under the conditions of `fit_all`."""
+    """Fit all samples, starting from the parameters of `fit_few`; None if the fit leaves too large a misfit."""
     best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
-    if best[5] < 0:  # q and -q have the same energy, so the preload is made positive
+    if best[5] < 0:  # The deformations q and -q have the same energy.
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
@@ -165,7 +166,7 @@ def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) ->
 
 
 class Pencil(NamedTuple):
-    """Signal subspace of the exponentials in E: singular vectors of its Hankel matrix, shape (lags, lags).
+    """Signal subspace of the exponentials in E, as singular vectors of its Hankel matrix of shape (lags, lags).
 
     Matrix pencil (Hua and Sarkar, IEEE Trans.  ASSP 38, 1990): the leading right singular vectors of the Hankel matrix
     of equidistant values span the exponentials, and a shift by one cell multiplies each by exp(p h).  Means of an
@@ -177,13 +178,13 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Compute the singular vectors, beginning with the largest share of E."""
+        """Compute the singular vectors in descending order of their share of E."""
         running = integrate_by_trapezia(s, e)
         fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
         periods = int(
             np.argmax(power * np.arange(power.size))
-        )  # per octave, so that a decay alone is not preferred
+        )  # The power is weighted per octave, so that decays are not preferred.
         count = min(
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
@@ -276,7 +277,7 @@ def _find_starts(
 
 @np.errstate(
     over="ignore", invalid="ignore"
-)  # overflow is ignored, because a trial step that is too large is rejected
+)  # Overflow is ignored, because steps that are too large are rejected.
 def refine_parameters(
     parameters: Samples,
     model: Model,
@@ -291,7 +292,8 @@ def refine_parameters(
     squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
     ``doomed``.
     """
-    damping = 1e-4  # relative to the unit diagonal; small, since the starts are good
+    # The damping of the Levenberg-Marquardt method is small, because the start values are good.
+    damping = 1e-4
     cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
     free = gradient.size
     for steps_left in range(_MAX_STEPS, 0, -1):
@@ -355,7 +357,7 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the rms of what neighbours in ``rest`` share, beyond ``deviations`` standard deviations of white noise.
+    """Return the rms of what neighbouring values of ``rest`` share, beyond ``deviations`` standard deviations of noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """

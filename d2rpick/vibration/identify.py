@@ -23,29 +23,24 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Thresholds of acceptance. White noise may be large, but a true model leaves no structure in the misfit.
-# Structure is the part of the misfit that neighbouring samples share.
-HOPELESS: Final = (
-    0.5**2
-)  # unexplained share of the variance of 400 samples, six standard deviations above MAX_MISFIT
-# A residual above this share of the fitted energy at the same time shows a second, less damped mode.
+# A fit to 400 samples is refused at once if it leaves more than this share of the variance unexplained [-].
+HOPELESS: Final = 0.5**2
+# A structure of the misfit above this share of the fitted energy at the same time shows a second mode [-].
 MAX_LOCAL_STRUCTURE: Final = 0.1
-MIN_SAMPLES: Final = 24  # four for each parameter of the largest model
-# Samples per energy period pi / omega. With fewer samples, aliasing makes a fast mode look slow.
+# Smallest number of samples, which is four for each parameter of the largest model.
+MIN_SAMPLES: Final = 24
+# Smallest number of samples per energy period pi / omega, so that aliasing does not make a fast mode look slow.
 MIN_SAMPLES_PER_PERIOD: Final = 10
-MAX_GROWTH: Final = (
-    0.3  # -alpha x record length: noise may make a vibration seem to grow by this
-)
-# Share of the energy range. Plastic work is positive, apart from fitting errors.
+# Largest growth -alpha t over the length t of the record [-]; noise may make a vibration seem to grow.
+MAX_GROWTH: Final = 0.3
+# Smallest plastic work as a share of the energy range [-]; it is negative only because of fitting errors.
 MIN_PLASTIC: Final = -0.05
-MAX_OF_SPRING: Final = (
-    0.1  # misfit of a vibration through zero with a stiffening spring
-)
-_OF_A_PRELOAD: Final = (
-    0.03  # share of the vibration energy that increases a residual of 0.2 to 0.4
-)
+# Largest misfit of a vibration without preload that is due to a stiffening spring [-].
+MAX_OF_SPRING: Final = 0.1
+# Assumed hidden share of the vibration energy if a preload is replaced with a stiffening spring [-].
+_OF_A_PRELOAD: Final = 0.03
 
-# For each model, the simplest first: its number of free parameters, and the periods needed to identify it.
+# For each model, beginning with the simplest, its number of parameters and the number of periods needed to identify it.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -197,7 +192,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge the fits, the simplest first, and return the first that follows the samples, else the best refused fit.
+    """Judge the fits, beginning with the simplest, and return the first that follows the samples, else the best one.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
@@ -319,7 +314,7 @@ def _refuse_short_record(time: Samples, energy: Samples) -> Identification | Non
         )
     if float(np.ptp(energy)) <= 1e-12 * float(
         np.max(np.abs(energy))
-    ):  # a constant with rounding errors
+    ):  # The energy is constant except for rounding errors.
         return _refuse_without_fit(
             time, f"the energy is constant, {energy[0]:g}: nothing vibrates"
         )

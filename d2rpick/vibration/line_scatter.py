@@ -18,11 +18,10 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lines import Exponentials, Grid
     from d2rpick.vibration.midpoint import Reading
 
-# Upper limit of the correlation of neighbouring misfits [-]. Beyond it no independent states would remain.
+# Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
 _MOST_SHARED: Final = 0.9
-# Assumed standard deviation of a rate before the fit, in cycles over the record. For a decay it is the decay itself
-# plus 1 over the record, for a weight the weight itself. Without such bounds the scatter of a line that the fit made
-# from noise would be unlimited.
+# Assumed standard deviation of the rate of a line before the fit, in cycles over the record.
+# This assumption limits the uncertainty of a line that the fit made from noise.
 _LOOSE_TURNS: Final = 0.5
 
 

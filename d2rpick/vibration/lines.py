@@ -24,35 +24,39 @@ if TYPE_CHECKING:
 
     Complex = NDArray[np.complex128]
 
-# Numbers of exponentials to try. Each line needs two, the mean needs one or more.
+# Numbers of exponentials that are tried; each spectral line needs two, and the mean needs at least one.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# _CLEARLY_BETTER: a higher order must reduce the prediction error to less than this share of it.
-# _PERFECT: below this relative prediction error no higher order is tried.
+# _CLEARLY_BETTER: more exponentials must reduce the prediction error to less than this share of it [-].
+# _PERFECT: with a smaller relative prediction error, more exponentials are not tried [-].
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
+# _BETTER: this share is used instead of _CLEARLY_BETTER if the misfit contains a line [-].
+# _OF_A_LINE: the misfit contains a line if its largest power exceeds the mean power by this factor [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
-# Share of the record that is fitted to predict the rest.
+# Share of the record that is fitted to predict the rest of the record [-].
 FIRST_PART: Final = 0.7
-# Longest window of the signal space [states], at most half of the record: the cost grows with its square.
+# Longest window of the signal subspace [states]; the computing time grows with the square of the length.
 _MOST_LAGS: Final = 340
-# _STATES_PER_PERIOD: states of the even grid per period of the fastest relevant line.
-# _FEWEST_STATES, _MOST_STATES: smallest and largest number of states of the grid.
+# _STATES_PER_PERIOD: number of states in the uniform grid per period of the fastest relevant line.
+# _FEWEST_STATES: smallest number of states in the uniform grid.
+# _MOST_STATES: largest number of states in the uniform grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
-# Times are treated as evenly spaced if they deviate by less than this share of a step, as rounded times do.
+# Times are treated as evenly spaced if they deviate by less than this share of an interval [-].
 _EVEN: Final = 1e-3
 # A line exceeds white noise if its power is more than this many times the median power.
 _ABOVE_NOISE: Final = 20.0
-# The slowest lines with the share _ALL_POWER of the power (without the trend) are relevant, with _STRONG_POWER strong.
-# A line of 1 % of the largest height has 1e-4 of the power; if the grid were too coarse, it would be aliased.
+# _ALL_POWER: the slowest lines that together have this share of the power are relevant [-].
+# _STRONG_POWER: the slowest lines that together have this share of the power are strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# A line that decays early is searched for in this first share of the record.
+# Lines that decay early are searched for in this first part of the record, given as a share of it [-].
 _EARLY: Final = 0.25
-# _LEAST_TURNS: fewest cycles of a line in the record. _MOST_DAMPED: largest damping of a line, as a share of its rate.
-# _MOST_DECAY: largest exponent by which a line decays within the record.
+# _LEAST_TURNS: smallest number of cycles of a line in the record.
+# _MOST_DAMPED: largest damping of a line, as a share of its angular frequency [-].
+# _MOST_DECAY: largest exponent with which a line decays within the record [-].
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 40.0
-# A free vibration does not grow, but noise may make it seem to grow by up to this exponent over the record.
+# Largest exponent with which a vibration seems to grow over the record because of noise [-].
 _MOST_GROWTH: Final = 0.2
-# The mean is a constant plus at most _MOST_DECAYS decays.
-# The exponents of two decays over the record differ by at least _SAME_DECAY.
+# _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
+# _SAME_DECAY: smallest difference of two decays, as exponents over the record [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -143,7 +147,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the turns of the fastest relevant line and of the fastest strong line within equidistant times (n,)."""
+    """Return how many cycles the fastest relevant and the fastest strong line have within equidistant times (n,)."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
@@ -233,7 +237,7 @@ class Prediction(NamedTuple):
 
 
 def predict(grid: Grid) -> Prediction | None:
-    """Find the number of lines that best predicts an energy; None if the record is too short or does not oscillate."""
+    """Find the lines, as many as best predict the energy; None if the record is too short or does not oscillate."""
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None
@@ -277,7 +281,7 @@ def _get_needed(spectrum: Spectrum) -> float:
 
 
 class _SignalSpace:
-    """The space spanned by the windows of a record, with the largest directions first."""
+    """The signal subspace, which is spanned by the windows of a record, with directions in descending order of size."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step

@@ -1,4 +1,4 @@
-"""Find lines whose rate and phase are locked to other lines: those of a static stretch and of nonlinear springs."""
+"""Find lines with rate and phase locked to other lines, which are due to a static deformation or nonlinear springs."""
 
 from __future__ import annotations
 
@@ -13,27 +13,32 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
-# Smallest height of a relevant line, relative to the strongest line (NOTABLE), relative to the line to which it is
-# locked (_NOTABLE_PARTNER), and in standard deviations (ABOVE_SCATTER).
+# NOTABLE: smallest height of a relevant line, relative to the strongest line [-].
+# _NOTABLE_PARTNER: smallest height of a line to which other lines are locked, relative to the strongest line [-].
+# ABOVE_SCATTER: smallest height of a relevant line, in standard deviations [-].
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# _SAME_RATE: two rates are treated as equal if they differ by less than this share of a cycle over the record.
-# _EXACT_RATE: they are exactly equal if they differ by less than this angle [rad], plus what scatter may add.
+# _SAME_RATE: two rates are treated as equal if they differ by less than this share of a cycle over the record [-].
+# _EXACT_RATE: two rates are exactly equal if they differ by less than this angle over the record [rad].
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
-# Largest phase error of a locked line [rad]: for the line of a stretch, and for harmonics.
+# _SAME_PHASE: largest phase error of a line that is locked because of a static deformation [rad].
+# _SAME_PHASE_OF_HARMONICS: largest phase error of a harmonic [rad].
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# A spring with q'' + q + e q^3 = 0 has an energy whose third harmonic, times the first over the square of the second,
-# is 0.42 for a large e up to 0.53 for a small one, and whose second over the first is at most 0.35 (elliptic cosine).
+# These constants concern the harmonics h1, h2, h3 of the energy of a stiffening spring with q'' + q + e q^3 = 0.
+# _THIRD_OF_SPRING: expected ratio h3 h1 / h2^2 [-], which is 0.42 for a large e and 0.53 for a small e.
+# _THIRD_ROOM: relative tolerance for the third harmonic [-].
+# _HIGHEST_SECOND: largest ratio h2 / h1 [-]; it is at most 0.35 in theory (elliptic cosine).
 _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
-# A stretch that oscillates has energy at these multiples of its rate, as the force in a pendulum has harmonics.
+# A slowly oscillating deformation has energy at these multiples of its rate, like the force in a pendulum.
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
 # Two heights are treated as equal if the logarithm of their ratio is below this.
 _SAME_HEIGHT: Final = 0.1
-# Harmonics are searched for at this many of the strongest lines (_STRONGEST), in these orders (_HARMONICS).
+# _STRONGEST: number of the strongest lines whose harmonics are searched for.
+# _HARMONICS: orders of the harmonics that are searched for.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class StretchLine(NamedTuple):
-    """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy].
+    """The ``line`` due to a static deformation, about which the mode of the line ``of_mode`` vibrates.
 
     ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
     ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
@@ -49,7 +54,7 @@ class StretchLine(NamedTuple):
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
 ) -> tuple[StretchLine, ...]:
-    """Find the lines of modes that vibrate about a static stretch, as in a rotating body.
+    """Find the lines of modes that vibrate about a static deformation, as in a rotating body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
     In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
@@ -93,7 +98,7 @@ def find_stretches(
 def _find_side_lines(
     lines: Exponentials, span: float, scatter: float
 ) -> list[StretchLine]:
-    """Find the side lines of modes whose static stretch oscillates.
+    """Find the side lines of modes that vibrate about a slowly oscillating deformation.
 
     A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
     their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
@@ -223,7 +228,7 @@ def _measure_locked_to(
         apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
         if line == first or apart or size[line] < ABOVE_SCATTER * scatter:
             break
-        # stiffening and softening springs have harmonics of opposite signs
+        # Stiffening and softening springs have harmonics of opposite signs.
         if (
             abs(_wrap(phase[line] - times * phase[first], np.pi))
             > _SAME_PHASE_OF_HARMONICS

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Mode
 
-    # Measures of n times: arrays of shape (n,) by name, NaN for unknown values.
+    # Measures of n times, as arrays of shape (n,) by name, with NaN for unknown values.
     Columns = Mapping[str, Samples]
     # Function that returns the residual of each tr with its lower and upper bound [-].
     # Its arguments are the residual of the deformations, tr, and td.
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
-# Increase of the frozen-deformation error that ``timing_tolerance`` allows.
+# Increase of the frozen-deformation error that ``timing_tolerance`` allows [-].
 TOLERATED_GROWTH = 0.05
-# The part of R^2 that depends on the phases at td is this factor times the damping ratio; theory allows up to 2.
+# Factor on the damping ratio that gives the part of R^2 that depends on the phases at td [-]; theory allows up to 2.
 _PHASES_COUNT = 1.5
 
 
@@ -93,7 +93,8 @@ def measured(
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
     """Place columns of `Measured` at the given rows of a table with ``size`` rows; the other rows are NaN."""
-    nothing = np.broadcast_to(np.nan, size)  # a broadcast array needs no memory
+    # This array needs no memory, because it is broadcast from a single value.
+    nothing = np.broadcast_to(np.nan, size)
     spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
     for rows, columns in found:
         for name, column in columns.items():
@@ -210,7 +211,7 @@ def wrong_sign(kinetic: float) -> float:
 def run_time_share(
     rigid_fraction: float, cost_share: float, step_ratio: float
 ) -> float:
-    """Return the expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
+    """Return the expected run time of the switched run relative to that of the reference, 1 - f (1 - (1 - c)/n) [-].
 
     In the rigid window, a fraction f of the run, the share c of a step's cost that the switched parts' elements need is
     saved, and there are n times fewer steps.
@@ -233,7 +234,7 @@ def run_time_share(
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return by how much each tr (n,) may be wrong in either direction before L grows by 0.05 [time]; td as for L.
+    """Return by how much each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
 
     That is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr by the
     tolerated growth; one period if q stays inside, since q has then passed all its values.
@@ -257,7 +258,7 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself is inside, whatever rounding says
+    outside[0] = False  # tr itself is always inside, even if rounding puts it outside.
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
@@ -306,7 +307,7 @@ class Profile(NamedTuple):
         """Compute the profile at the times before ``td``."""
         time_before = time[
             : np.searchsorted(time, td)
-        ]  # These are views, since a copy for each td would fill the memory.
+        ]  # The arrays are views, because a copy for each td would fill the memory.
         return cls(time_before, lock_in_error(vibration, time_before, td))
 
     def minima(self) -> tuple[float, ...]:

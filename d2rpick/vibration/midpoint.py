@@ -93,10 +93,10 @@ class Reading:
 
     @cached_property
     def _within_period(self) -> Exponentials:
-        """Return the change of each mode's vibration energy within a period: damping acts only during motion."""
+        """Return how damping changes the vibration energy of each mode within a period; it acts only during motion."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
-        # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight of each line
+        # The weight of each line gives the change as its real part, z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta).
         turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 
@@ -129,7 +129,7 @@ class Reading:
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X without limits; noise and a wrong model may exceed the bounds [energy]."""
+        """Return X without limits; because of noise or a wrong model it may exceed its bounds [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)

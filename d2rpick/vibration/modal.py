@@ -45,73 +45,76 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Lines are searched for only in records with at least this many states.
+# Spectral lines are searched for only in records with at least this many states.
 _FEWEST_STATES: Final = 32
-# A static energy below this share of the mean vibration energy may be a fitting error.
+# A static energy below this share of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
-# There is no vibration if the relative range of the energy is smaller, since single precision cannot resolve it.
+# There is no vibration if the relative range of the energy is below this [-], which single precision cannot resolve.
 _RESOLVED: Final = 2e-7
-# Smallest divisor, as a share of the range of the record.
+# Smallest number by which energies are divided, as a share of the energy range of the record [-].
 _TINY: Final = 1e-12
-# The overlap is compared with its bounds for this many values of tr, and for as many of td.
+# Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
 _CHECKED: Final = 90
 
-# A line may be a stretch or a mode of half the rate if the static energies differ by less than this share of the mean.
+# It is unclear whether a line is due to a static deformation if the energies differ by less than this share [-].
 _AMBIGUOUS: Final = 0.08
 
-# Limits beyond which a record is refused, beginning with the prediction error.
-_MOST_MISSED: Final = 0.5  # prediction error relative to the range of the energy
-_MOST_MISFIT: Final = 0.3  # misfit relative to the range of the energy
-_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
-    0.07,
-    0.5,
-)  # negative static energy relative to the mean vibration energy, in excess of noise
-_MOST_DRIFT: Final = (
-    0.6  # change of the static energy relative to the mean vibration energy
-)
-_MOST_BEYOND: Final = 0.12  # overlap beyond its bounds relative to the vibration energy, rms over all pairs
-_MOST_HARMONIC: Final = 0.05  # size of harmonics relative to their fundamental line
-_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
-    0.15,
-    0.6,
-)  # energy of a stretch that the static energy does not contain
-_FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
+# Largest prediction error, relative to the range of the energy, with which a record is not refused [-].
+_MOST_MISSED: Final = 0.5
+# Largest misfit, relative to the range of the energy, with which a record is not refused [-].
+_MOST_MISFIT: Final = 0.3
+# _MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
+# _MOST_NEGATIVE_AT_ALL: limit of the same ratio if there is no better model [-].
+_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
+# Largest change of the static energy, relative to the mean vibration energy, with which a record is not refused [-].
+_MOST_DRIFT: Final = 0.6
+# Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
+_MOST_BEYOND: Final = 0.12
+# Largest size of harmonics, relative to their fundamental line, with which a record is not refused [-].
+_MOST_HARMONIC: Final = 0.05
+# _MOST_UNSTRETCHED: largest energy of a static deformation that the static energy lacks [-].
+# _MOST_UNSTRETCHED_AT_ALL: limit of the same energy if there is no better model [-].
+_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
+# Smallest number of states per period of the fastest strong line with which a record is not refused.
+_FEWEST_PER_PERIOD: Final = 2.4
 
-# Times per period of the fastest relevant line at which deformations are evaluated.
+# Number of times per period of the fastest relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Between these times, each interval is divided into this many parts in which the energy is treated as linear.
+# Number of parts of the interval between two of these times, in each of which the energy is interpolated linearly.
 _FINER: Final = 4
 
-# Largest misfit (_LITTLE_LEFT) and prediction error (_LITTLE_MISSED) of modes that show a flight,
-# relative to the energy range.
+# _LITTLE_LEFT: largest misfit of modes that show a flight, relative to the energy range [-].
+# _LITTLE_MISSED: largest prediction error of modes that show a flight, relative to the energy range [-].
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# Half-width of the band of R^2 before it is widened for known errors, and how far a solver's structure is from a linear
-# one, relative to its deformation [-]: R of pairs of a shell box is off by 0.015 to 0.018 rms against all its nodes.
+# _LEAST_HALF: half-width of the error band of R^2 before it is widened for known errors [-].
+# _NOT_LINEAR: relative error of a deformation because real structures are not linear [-].
+# For a shell box, R deviated by 0.015 to 0.018 (rms) from the R of all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
-_VAGUE_HALF: Final = (
-    0.2  # half-width of R^2 for poorly identified modes; otherwise it is 0.02 to 0.1
-)
-_SOME_TIMES: Final = 64  # number of times at which the band is evaluated
-# Half-width of the band of R^2 in standard deviations, as for a single oscillator.
+# If the half-width of the error band of R^2 exceeds this, the modes are poorly identified [-].
+_VAGUE_HALF: Final = 0.2
+# Number of times at which the error band is evaluated.
+_SOME_TIMES: Final = 64
+# Half-width of the error band of R^2 in standard deviations, as for a single oscillator.
 _DEVIATIONS: Final = 2.5
-# What remains of the record beside its lines changes R^2 by this many times its share of the energy: V enters it at tr
-# and, twice, halfway, and 1.6 is the ratio of the 90 % quantile of a normal distribution to its deviation.
+# Effect on R^2 of the part of the energy that the lines do not explain, as a factor on its share of the energy [-].
+# It combines the energies at tr and, twice, halfway; 1.6 is the 90 % quantile of a normal distribution.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
-# A correlation of neighbouring states below this many standard errors is treated as noise.
+# A correlation of neighbouring misfits is treated as noise if it is below this many standard errors.
 _CHANCE: Final = 2.0
-# Effects on R^2: of a mean energy that changes in the flight, where the first part predicts the rest as badly as
-# `_LITTLE_MISSED`; and of a negative static energy, or one too small for its stretch.
+# _DRIFT_COUNTS: effect on R^2 of a mean energy that changes in the flight, as a factor on the change [-].
+# _NEGATIVE_COUNTS: effect on R^2 of a negative or too small static energy, as a factor on its relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
-# Effect of the second harmonic of a stiffening spring on R^2, where both deformations are alike, and where they are
-# farthest from being alike or opposite.  A spring whose amplitude falls also changes its rate.
+# _BENT_ALIKE: effect on R^2 of the second harmonic of a stiffening spring, if both deformations are equal [-].
+# _BENT_ACROSS: additional effect on R^2 of this harmonic, if the deformations are orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 # R^2 of deformations that are equal and opposite: lines that say nothing leave no more open.
 _MOST_OPPOSED: Final = 4.0
-# Squared difference of an oscillating stretch at two times over its mean square; it is 2 on average, 8 at most.
+# Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
-_HIDDEN_LINES: Final = 12  # assumed number of lines hidden in the misfit
+# Assumed number of lines that are hidden in the misfit.
+_HIDDEN_LINES: Final = 12
 
 
 class Doubts(NamedTuple):
@@ -260,11 +263,11 @@ class ModalVibration:
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record even ten times better than they have to."""
+        """Return True if the modes predict the record ten times better than required."""
         return self._predicts_within(0.1)
 
     def _predicts_within(self, share: float) -> bool:
-        """Return True if the modes miss no more of the record than a share of what they may, apart from white noise."""
+        """Return True if the error of the modes, apart from white noise, is below a share of the acceptable error."""
         white = 1 - self.systematic
         structure = self.doubts.misfit * np.sqrt(self.systematic)
         missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
@@ -364,7 +367,7 @@ class ModalVibration:
     def _compute_errors(
         self, tr: Samples | float, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the error of R^2 for pairs of times, and how far alternatives are below and above it, beyond that [-].
+        """Return the error of R^2 for pairs of times, and how much lower and higher other interpretations are [-].
 
         Alternatives are other readings of the lines, and what the kinetic energy says: each is on one side.
         """
@@ -375,7 +378,7 @@ class ModalVibration:
             / level
         )
         deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
-        # Both show how accurate the lines are: the scatter of the fit, and the fit to the first part of the record.
+        # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
             np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
         )
@@ -383,7 +386,7 @@ class ModalVibration:
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
         off = np.asarray(
             _LEAST_HALF
-            # These do not depend on each other.
+            # The following errors are independent of each other.
             + np.sqrt(of_lines**2 + of_rest**2 + of_structure**2)
             + min(self._wrong, 1.0) * (1 + np.abs(squared - 1))
             + self._phase_share * squared
@@ -479,7 +482,7 @@ class ModalVibration:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Return True if it is unclear whether lines at half the rate of others belong to a stretch or to modes."""
+        """Return True if lines at half the rate of others may be due to a static deformation or to modes."""
         return not self.reading.is_mode.all() and bool(self.others)
 
 
@@ -556,7 +559,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
-    """Return the correlation of neighbouring states of the remainder, at least 0: the share that is no white noise."""
+    """Return the correlation of neighbouring misfits, at least 0, which is their share without white noise."""
     products = np.sum(remainder[1:] * remainder[:-1])
     power = max(float(np.sum(remainder**2)), 1e-300)
     return float(np.clip(products / power, 0.0, 1.0))
@@ -565,7 +568,7 @@ def _correlate_neighbours(remainder: Samples) -> float:
 def _separate_stretches_from_springs(
     spectrum: Spectrum, grid: Grid, scatter: float
 ) -> tuple[tuple[StretchLine, ...], list[ThirdHarmonic]]:
-    """Return the stretches among the lines, and the third harmonics of the lines that may be of stiffening springs."""
+    """Return the lines due to static deformations, and the third harmonics that may be due to stiffening springs."""
     locked = find_stretches(spectrum.lines, grid.span, scatter)
     thirds = {
         stretch: measure_third_harmonic(stretch, spectrum, grid.time, scatter)
@@ -686,7 +689,7 @@ def _find_most_hidden(rest: Samples) -> float:
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
-    """Return the error of R^2 if the difference of two deformations has an error of a share ``off`` of them [-]."""
+    """Return the error of R^2 if the difference of two deformations has the relative error ``off`` [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 
@@ -704,7 +707,7 @@ def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
 
 
 def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask:
-    """Return a mask of the lines that do not belong to a stretch."""
+    """Return a mask of the lines that are not due to a static deformation."""
     is_kept = np.ones(lines.poles.size, dtype=bool)
     is_kept[[stretch.line for stretch in stretches]] = False
     return is_kept

@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 _PARTS: Final = 16
 # Windows that reach the end of the record begin at these shares of it.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window the record follows the modes as long as means over a fraction of the fastest period deviate little.
-# _MEANS_PER_PERIOD: number of means per period. _MOST_OFF: largest deviation as a share of the vibration energy.
-# _SCATTERS_OFF: largest deviation in standard deviations of such means.
+# Outside its window, the record follows the modes as long as means over a part of the fastest period deviate little.
+# _MEANS_PER_PERIOD: number of these means per period of the fastest mode.
+# _MOST_OFF: largest deviation of a mean, as a share of the vibration energy [-].
+# _SCATTERS_OFF: largest deviation of a mean, in standard deviations of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
 # Largest number of times that a window is extended and identified again.
 _MOST_REFITS: Final = 3
@@ -70,7 +71,7 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
-    """Return the part of a guessed window made of complete 1/16 of the record, so that many td share few windows."""
+    """Return the part of a window that begins and ends at multiples of 1/16 of the record, so that many td share it."""
     first = history.start
     last = history.end
     part = (last - first) / _PARTS
@@ -155,7 +156,7 @@ def _count_up_to_last_off(
         return int(time.size)
     with np.errstate(
         over="ignore", invalid="ignore"
-    ):  # Far from the window, damped modes overflow.
+    ):  # Far from the window, the exponentials of damped modes overflow.
         deviation = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(

@@ -43,15 +43,16 @@ if TYPE_CHECKING:
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.span import Span
 
-# The reason given if the vibration at td is below the noise, so that no tr can be trusted.
+# Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# Residual of a release without any vibration: a switch with a larger residual preserves nothing [-].
+# Residual of a release without any vibration [-]; a pair with a larger residual preserves nothing.
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the time before td saves little, and its deformation is similar only because it is near.
+# A tr in this last share of the time before td saves little [-], although its deformation is similar.
 NEAR_TD: Final = 0.25
-# How far a match may be from the true minimum, in intervals of the profile.  With modes, known between states as well,
-# 93 % of 2200 vertices of parabolas were within an eighth, and the others where the error hardly changes.
+# _OF_INTERVAL: largest distance of a match from the true minimum of the error, in intervals of the profile [-].
+# _OF_INTERVAL_BY_MODES: the same distance with modes, which are known between the states too [-].
+# With modes, 93 % of 2200 matches were closer than this, and the others were where the error hardly changes.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 
 
@@ -114,7 +115,7 @@ class Vibration:
 
     @property
     def kinetic_share(self) -> float | None:
-        """Return K at td [-]; None if it is unknown."""
+        """Return the kinetic fraction K at td [-]; None if it is unknown."""
         if self.compared is None:
             return None
         return float(measures.kinetic_share(self.compared.deformation, self.td))
@@ -355,7 +356,7 @@ class Evidence(NamedTuple):
 
     @property
     def signed(self) -> str | None:
-        """Return the name of the model that gives the sign; None if none does."""
+        """Return the name of the model that gives the sign of the deformation; None without such a model."""
         return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
@@ -366,7 +367,7 @@ class Evidence(NamedTuple):
 
     @property
     def has_sure_modes(self) -> bool:
-        """Return True if modes give the sign and are reliable, not merely the last resort."""
+        """Return True if reliable modes give the sign of the deformation."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal is not None and modal.doubts.refusal is None
 
@@ -409,7 +410,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
     # If neighbouring misfits are correlated there is a further mode, which the modal model describes better.
-    # White noise can only hide a mode.
+    # If the misfits are white noise, they do not show a further mode.
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
         return _compare_with_signs(
@@ -461,7 +462,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
-        # Lines can be fitted with fewer states than a level needs, and the fit refuses a record with too few.
+        # Fitting lines needs fewer states than determining a level, and the fit refuses records with too few.
         aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",

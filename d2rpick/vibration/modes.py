@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Samples per block, so that intermediate results fit into the cache of the processor.
+# Number of samples per block, so that intermediate results fit into the cache of the processor.
 BLOCK: Final = 8192
-# Most steps of the root search; bisection alone reaches rounding with them.
+# Largest number of steps of the root search, with which bisection alone reaches full precision.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
 # Energies below this share of the highest energy may be solver errors, which are typically 1/10 of this.
@@ -141,15 +141,14 @@ class Mode(SignedAmplitudes):
     def standstill_after(self, t: Samples | float) -> Samples:
         """Find the first time after or at ``t`` with q' = 0; the next one is half a period later."""
         cosine, sine = self._velocity_parts
-        phase = np.arctan2(
-            -cosine, sine
-        )  # cosine cos x + sine sin x = 0 at x = phase + n pi
+        # The velocity, cosine cos x + sine sin x, is 0 at x = phase + n pi.
+        phase = np.arctan2(-cosine, sine)
         turns = np.ceil((self.omega * (np.asarray(t) - self.origin) - phase) / np.pi)
         return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) with q' = 0, in ascending order [time]."""
-        if not start < end:  # For some ``start`` the phase is not finite.
+        if not start < end:  # For infinite times the phase would not be finite.
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(
@@ -184,7 +183,7 @@ class Mode(SignedAmplitudes):
     ) -> tuple[NDArray[np.intp], Samples]:
         """Find the level crossings for every ``td`` (n,) at once; return the index of the td and the time of each."""
         level = self.deformation(td)
-        # Each zero of q crosses the level zero once, whatever the sign of the rounding error.
+        # Each zero of q is one crossing of the level zero, whatever the sign of the rounding error.
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
@@ -212,9 +211,8 @@ class Mode(SignedAmplitudes):
             + np.sqrt(self.vibration_energy(edges))
         )
         above[np.abs(above) <= 8 * _EPS * scale] = 0.0
-        row, cell = np.nonzero(
-            above[:, :-1] * above[:, 1:] < 0
-        )  # q is monotone between neighbouring extrema
+        # The deformation q is monotone between neighbouring extrema.
+        row, cell = np.nonzero(above[:, :-1] * above[:, 1:] < 0)
         side = np.sign(above[row, cell])
         wanted = levels[row]
         times = narrow_brackets(
@@ -271,9 +269,8 @@ def compute_energy_and_jacobian(
     swing = cosine * cos + sine * sin
     q = preload + swing
     twice = q + q
-    jacobian = np.empty(
-        (size, s.size)
-    )  # written in place, because identification spends most of its time here
+    # The array is filled in place, because identification spends most of its time here.
+    jacobian = np.empty((size, s.size))
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])
     jacobian[1] *= -0.5

@@ -29,25 +29,27 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# The sign is uncertain if the scatter of the last period exceeds this share of the vibration energy at td.
+# The sign of the deformation is uncertain if the misfit exceeds this share of the vibration energy at td [-].
 _DROWNED = 0.2
-# Times that differ by less than this phase [rad] are treated as equal.
+# Times are treated as equal if their phases differ by less than this [rad].
 _ZERO = 1e-9
 
-# Kinds of moments: crossing of the level, extremum near the level, and match of several deformations.
-# Further kinds are the start of a flight without vibration, and a given time.
+# "crossing": the energy crosses the target energy.
+# "extremum": the energy has an extremum near the target energy.
+# "match": the deformation of several modes is similar to that at td.
+# "start": a flight without vibration starts.
+# "given": the user gave the time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
-# Between samples E'' may exceed the second differences. On random vibrations with at least 8 samples per period,
-# 25 % more covers 99 % of the true crossings.
+# Factor on the second differences of the energy, because E'' may be larger between the samples [-].
+# For random vibrations with at least 8 samples per period, this factor covers 99 % of the true crossings.
 _BEND_RESERVE = 1.25
 # Number of standard deviations in the error of a time; 3 cover 99.7 % of normal errors.
 _DEVIATIONS = 3.0
-# Rounding errors are many and independent: 2.6 standard deviations of their sum cover 99 %.
-# They are added to the interpolation error as independent errors.
+# Number of standard deviations of a sum of rounding errors, which are independent; 2.6 cover 99 %.
 _ROUNDING_DEVIATIONS = 2.6
-# The systematic misfit is mostly a vibration, whose peaks are sqrt(2) times its rms.
+# Ratio of the largest systematic misfit to its rms [-], which is that of a vibration.
 _PEAK_OF_REST = sqrt(2)
-# Safety margin as a share of the output interval, since even a close fit is only a model between the samples.
+# Safety margin for times between the samples, as a share of the output interval [-].
 _BETWEEN_SAMPLES = 1e-3
 
 
@@ -66,10 +68,10 @@ class SampledEnergy:
         return self.history.energy_at(time)
 
     def energies(self, times: Samples) -> Samples:
-        """Return E at the given times, of their shape [energy]."""
+        """Return the energy E at the given times, in their shape [energy]."""
         return self.history.energies_at(times)
 
-    def described(self, time: float) -> bool:  # noqa: ARG002  of samples alone there is no model
+    def described(self, time: float) -> bool:  # noqa: ARG002  required by the interface
         """Return True if modes describe the energy at a time."""
         return False
 
@@ -137,17 +139,18 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # Even the complete scatter of the fit would be too small.
+            return (
+                None  # Even if all scatter were in this period, it would be too small.
+            )
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
-        if (
-            vibration > 0 and scatter <= _DROWNED * vibration
-        ):  # Both energies may underflow.
+        # Both energies may underflow to 0.
+        if vibration > 0 and scatter <= _DROWNED * vibration:
             return None
         finding = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
         return f"{finding}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
-        """Return E at the given times, of their shape [energy]."""
+        """Return the energy E at the given times, in their shape [energy]."""
         return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
@@ -183,7 +186,8 @@ class OscillatorEnergy(SampledEnergy):
 
     def standstills(self) -> Samples:
         """Return the times in the span before td at which the energy turns, and td itself if it does [time]."""
-        end = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
+        # The time td itself may be an extremum, which rounding may place before it.
+        end = self.td - _ZERO / self.mode.omega
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
 
@@ -215,7 +219,7 @@ class OscillatorEnergy(SampledEnergy):
     ) -> Samples:
         """Apply one function to times in the window described by the modes, another function to all others."""
         is_described = self.within(times)
-        if is_described.all():  # Usually the modes describe all times.
+        if is_described.all():  # In the usual case the modes describe all times.
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (
@@ -308,9 +312,8 @@ def find_moments_of_mode(
         [*(up for _, up in early), mode.energy_slopes(times)[0] > 0]
     )
     turns = seen[int(td.argmax())].standstills()
-    of, which = np.nonzero(
-        turns < (td - _ZERO / mode.omega)[:, np.newaxis]
-    )  # td may be an extremum itself
+    # The time td itself may be an extremum, which rounding may place before it.
+    of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
     moments = Moments.of_level(
         crossings, rising, Moments.of("extremum", turns[which[near]])
@@ -353,7 +356,7 @@ def compute_sampled_reach(
     cell, interval = _find_cells(time, times)
     at_td, _ = _find_cells(time, np.atleast_1d(td))
     bend = estimate_curvature(time, energy, times)
-    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours, zero at a sample
+    # The error of linear interpolation is E''/2 times the distances to both neighbouring samples.
     off_td = (
         float(estimate_curvature(time, energy, td))
         * (td - time[at_td])
@@ -452,7 +455,7 @@ def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> S
 def compute_reach(
     slope: Samples | float, bend: Samples | float, error: Samples | float
 ) -> Samples:
-    """Return the time error of a crossing for an energy error ``error``.
+    """Return the error of a crossing time that follows from the energy error ``error`` [time].
 
     The smaller root x of slope x - bend x^2/2 = error; without a root the curve may turn before it reaches the level,
     and sqrt(2 error/bend) is the distance at which the bend alone accounts for the error.
@@ -472,9 +475,8 @@ def compute_reach(
     )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         steep = slope / error
-        curved = (
-            bend / error
-        )  # Divided by the error, since squares of energies might overflow.
+        # The bend is divided by the error, because squares of energies might overflow.
+        curved = bend / error
         root = steep**2 - 2 * curved
         regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
         turning = np.sqrt(2 / curved)

@@ -26,12 +26,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-# In quotes to keep start-up fast, because numpy.typing is slow to import.
+# The type is quoted to keep start-up fast, because numpy.typing is slow to import.
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Limits of stiffness and masses, far outside the values that occur in any unit system.
-# Beyond them, products and quotients overflow.
+# Limits of stiffness and masses, beyond which products and quotients overflow; real values are far from them.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
@@ -245,7 +244,7 @@ class Oscillator:
 def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # For tiny products the quotient loses its digits; two terms of the series are exact then.
+    # For tiny products the quotient loses its digits, whereas two terms of the series are exact.
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),

@@ -1,4 +1,4 @@
-"""Compute the band of an identified oscillator's residual: scatter, damping and hidden modes widen it."""
+"""Compute the error band of an identified oscillator's residual, due to scatter, damping and hidden modes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Half-width of the band of R^2 due to scatter, in standard deviations.
+# Half-width of the error band of R^2 due to scatter, in standard deviations.
 _DEVIATIONS: Final = 2.5
-# Largest R^2 of a hidden mode in opposite phase that leaves the stated residual as it is.
-# A pair with a residual of 0.25 is still nearly good, so it is enough to state the upper bound.
+# Largest effect on R^2 of a hidden mode that does not change the stated residual, but only its upper bound [-].
 _HARMLESS: Final = 0.25**2
-# Effect on R^2 of a hidden share that consists of harmonics of a nonlinear spring.
-# R has an error of up to half of this factor times the share, even between the peaks.
+# Effect on R^2 of a hidden share that consists of harmonics of a nonlinear spring, as a factor on this share [-].
 _HARMONIC_COUNTS: Final = 8.0
 
 
@@ -53,12 +51,12 @@ def residual_band(
     off = scatter + share * squared + bent
     opposed = _count_opposed(fit, tr, td)
     decayed = _count_decayed(fit, tr, td)
-    # The misfit hides a mode that lasts or one that dies early: the worse of the two counts.
+    # The misfit may hide a lasting mode or an early decaying mode, of which the one with the larger effect is assumed.
     hidden = np.maximum(fit.hidden_share * opposed, decayed)
     stated_now, low, high = measures.band_about(
         squared, off, hidden, fit.hidden_share * squared
     )
-    # Beyond solver errors, a hidden mode is as likely as none, so half of what it may add is stated.
+    # A hidden mode is as likely as none, so the stated residual includes half of the effect beyond solver errors.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error

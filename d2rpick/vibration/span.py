@@ -28,39 +28,42 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Trial windows begin at the shares _BEGINNINGS of the time before td and end at the shares _ENDS of the time after td.
-# Any flight of several periods is mostly filled by one of these windows.
+# _BEGINNINGS: trial windows begin before td by these shares of the time before td [-].
+# _ENDS: trial windows end after td by these shares of the time after td [-].
+# One of these windows fills most of any flight of several periods.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Further windows end before td, by these shares of the time before td, because td may be in the next contact.
+# Further trial windows end before td by these shares of the time before td [-], as td may be in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
-# Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits.
-# The distance of each mark is this share of the distance of the next mark.
+# Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
+# The distance of each mark from the end of the record is this share of the distance of the next mark [-].
 _MARKS = 0.87
-# A window that an oscillator describes has at least _LEAST_PERIODS periods and the share _MOST of the fitted
-# samples. A smaller window may fit by chance, or contain a transition in the record.
+# _LEAST_PERIODS: smallest number of periods of a window that an oscillator describes; fewer may fit by chance.
+# _MOST: a window that an oscillator describes contains at least this share of the fitted samples [-].
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# The ends of a window do not belong to the flight if a fit without them reduces the scatter below this share.
+# The ends of a window do not belong to the flight if a fit without them reduces the misfit to less than this share [-].
 _MUCH_BETTER = 0.7
-# The record leaves the fitted oscillator if the mean error over 1/25 period exceeds the largest of three limits:
-# a share of the vibration energy, a number of standard errors, and a multiple of the systematic misfit.
-# The mean uses at least three samples; white noise exceeds the limit once in a million means.
+# The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
+# _SHARE_OFF: limit of the mean error as a share of the vibration energy [-].
+# _ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
+# _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
+# _MEANS_PER_PERIOD: number of these means per period.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Means per period of the energy that show a mode which is hidden only in a part of the window.
+# Number of means per energy period that are used to detect a mode in only a part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
-# An oscillator that describes this share of the bounds is used for every td in its window; no other is searched for.
+# An oscillator that describes at least this share of the bounds is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
-# Largest number of fits of the growing window; two are usual.
+# Largest number of times that a growing window is fitted again; two are usual.
 _MOST_REFITS = 8
 
-# Smallest share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06.
-# Real solvers have errors of this size.
+# Smallest share of the vibration energy of a hidden mode that is considered [-], which is the error of real solvers.
 SMALLEST: Final = 1e-3
-_MOST_LINES: Final = 8192  # enough for 800 periods of the energy
-_FINER: Final = 4  # points per line of a spectrum, to resolve its peak
-_CELLS_PER_PERIOD: Final = (
-    4  # per period of the fastest line; fewer would average most of it out
-)
-# a pair of times without any state between them
+# Largest number of lines in a spectrum, which suffices for 800 periods of the energy.
+_MOST_LINES: Final = 8192
+# Number of points per line of a spectrum, so that its peak is resolved.
+_FINER: Final = 4
+# Number of cells per period of the fastest line, so that the means over cells still contain most of it.
+_CELLS_PER_PERIOD: Final = 4
+# Pair of times that has no state between them.
 _NO_STATE: Final = (np.inf, np.inf)
 
 
@@ -133,7 +136,7 @@ def find_oscillator(
 def _add_what_is_hidden(
     history: History, fit: Identification, span: Span | None
 ) -> Identification:
-    """Add to an accepted fit what a further mode, hidden in the residuals of the fit or of the ``span``, may have."""
+    """Add to an accepted fit the energy of a mode that may be hidden in the misfit in its window or ``span``."""
     if not fit.describes_record or fit.mode is None:
         return fit
     described = span or Span(fit.start, fit.end)
@@ -144,7 +147,7 @@ def _add_what_is_hidden(
 def _estimate_what_is_hidden(
     history: History, described: Span, _: float, *, fit: Identification
 ) -> Identification:
-    """Return a fit with what is hidden; it is cached, so that situations can recognise that they share a fit."""
+    """Return a fit with the hidden energy. It is cached, so that situations can recognise that they share a fit."""
     assert fit.mode is not None
     share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
     times, deviations = measure_deviations(*history.between(*described), fit)
@@ -430,7 +433,8 @@ def _grow_span(
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            if not fit.describes_record:  # for example, the window may be too short
+            # The fit fails, for example, if the window is too short.
+            if not fit.describes_record:
                 return None, fit
             return _clear_ends(history, grown, fit, bounds, oscillator, quick=quick)
         span = grown
@@ -523,13 +527,13 @@ def measure_deviations(
     cells = np.minimum(np.searchsorted(edges, time, side="right") - 1, count - 1)
     states = np.bincount(cells, minlength=count)
     sums = np.bincount(cells, energy - fit.mode.energy(time), minlength=count)
-    # A product of roots does not overflow, as a difference of squares would.
+    # A product of roots is used, because a difference of squares might overflow.
     noise = np.sqrt(max(fit.rms - fit.structure, 0.0)) * np.sqrt(
         fit.rms + fit.structure
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond_noise = np.abs(sums) / states - _ERRORS_OFF * noise / np.sqrt(states)
-    # A cell without states tells nothing.
+    # A cell without states has no value.
     deviations = np.nan_to_num(np.maximum(beyond_noise, 0.0), posinf=0.0)
     padded = np.pad(deviations, _MEANS_PER_ENERGY_PERIOD)
     around = np.lib.stride_tricks.sliding_window_view(

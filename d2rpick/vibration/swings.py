@@ -24,22 +24,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turning point is counted if the energy goes back by this share of its last change. Less is noise or a faster mode.
+# A turning point is counted if the energy then goes back by at least this share of its last change [-].
 _SWING: Final = 0.2
-# A minimum is above the lower envelope if it deviates from the line through its neighbours by this share.
+# A minimum is not on the lower envelope if it deviates from the line through its neighbours by this share [-].
 _OFF_FLOOR: Final = 0.02
-# Half cycles are not counted if more than this share of the minima deviates; the others may be on a line by chance.
+# Half cycles are not counted if more than this share of the minima is not on the lower envelope [-].
 _MOST_OFF: Final = 0.1
-_FEWEST: Final = 5  # fewest minima that define a lower envelope
-# In a beat, neighbouring half cycles differ in length by at least this share.
+# Smallest number of minima that define a lower envelope.
+_FEWEST: Final = 5
+# In a beat, neighbouring half cycles differ in length by at least this share [-].
 _UNEVEN: Final = 0.03
-# Factor on the residual for any spring, to either side: the rate of a stiffening spring depends on the amplitude.
-# In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within it.
+# Factor by which the residual may be larger or smaller because the spring law is unknown [-].
+# In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
-# Effect of a hidden mode on the residual: a factor on the root of the hidden share, and what the states do not resolve.
-# It is at most 2 times that root, but the lower envelope shows only a part of it, 1/5 in one of 300 records of parts.
-# With both numbers 98.2 % of the residuals below 0.3 were in the band, of 1,378 records of two modes, a third near 2, 3
-# or 4 times the first rate.
+# _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of the hidden share [-].
+# The lower envelope shows only a part of a hidden mode, so this factor is larger than its theoretical value of 2.
+# _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
+# With both numbers, 98.2 % of the residuals below 0.3 in 1,378 records of two modes were in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05
 
 
@@ -103,7 +104,7 @@ class Swings(SignedAmplitudes):
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
-        )  # These are views, since a copy for each td would fill the memory.
+        )  # The arrays are views, because a copy for each td would fill the memory.
 
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
@@ -143,7 +144,7 @@ class Swings(SignedAmplitudes):
 
     @cached_property
     def _excursions(self) -> Samples:
-        """Return how far the floor is from the line through all of it, shape (k,) [energy]."""
+        """Return the distance of each minimum from the straight line through all minima, shape (k,) [energy]."""
         since_first = self.bottoms - self.bottoms[0]
         line = np.polyfit(since_first, self.floor, 1)
         return np.asarray(self.floor - np.polyval(line, since_first))
@@ -221,7 +222,8 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
     """Return the indices of the energy's turning points, and the last turning point that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    if 4 * turning_points.size > energy.size:  # So many turning points must be noise.
+    # This many turning points can only be noise.
+    if 4 * turning_points.size > energy.size:
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
     turns = []
@@ -331,7 +333,8 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     )
     (t0, top0), (t1, top1) = hull[max(next_vertex - 1, 0)], hull[next_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
-    if rate <= 0:  # the vibration energy never rises, so the highest peak bounds it
+    # The vibration energy never rises, so the highest peak bounds it.
+    if rate <= 0:
         return Envelope(float(np.exp(max(top for _, top in hull))), 0.0, middle, floor)
     return Envelope(float(np.exp(top0)), rate, t0, floor)
 

@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
-# Relative error of vibration energies from spectral lines, or oscillation counts [-].
+# Relative error of vibration energies that follow from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
 # Largest assumed number of similar modes with random phases; a computed car had 100 such modes.
-# The energy of m such modes has a relative standard deviation of 1/sqrt(8 m).
+# The total energy of m such modes has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# Means of computed runs exceed the prediction from spectral lines by at most this share [-].
+# In computed runs, the mean energy after td exceeds its prediction from spectral lines by at most this share [-].
 _OF_SOLVER: Final = 0.005
-# A fluctuation is determined from at least this many states.
+# Smallest number of states from which the fluctuation of the energy is determined.
 _FEWEST_STATES: Final = 8
 
 
@@ -88,7 +88,7 @@ def _compute_mean_ratio(
 
 
 def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Return bounds of the vibration energy at td, as pairs of the elastic and the whole energy [energy]."""
+    """Return bounds of the vibration energy at td, each as (elastic energy, total vibration energy) [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))

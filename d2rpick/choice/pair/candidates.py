@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from d2rpick.vibration.measures import Columns
 
 
-# Largest number of candidates that are judged together. Larger arrays are not faster, and noise makes tens of
-# thousands of candidates per td.
+# Largest number of candidates that are judged together; larger arrays need more memory and are not faster.
 _MOST: Final = 20_000
-_MORE: Final = 8  # largest growth factor of the number of td judged together
-# A candidate gets a note if its residual may be larger by this much [-].
+# Largest factor by which the number of td that are judged together grows from one batch to the next.
+_MORE: Final = 8
+# A candidate gets a note if the upper bound of its residual exceeds the residual by this much [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
@@ -144,7 +144,7 @@ class Judged:
         energy, measured = measure_all(vibrations, tr, ends)
         level_error = measures.level_error(energy, energy_td)
         if at_rest.any():
-            # the ratio of two round-off energies is not a meaningful error
+            # If nothing vibrates, the ratio of the energies is only that of rounding errors.
             level_error[at_rest] = 0.0
             measured = {
                 name: np.where(at_rest, np.nan, column)
@@ -218,7 +218,7 @@ class Judged:
     def error(self) -> Samples:
         """Error by which the candidates are ranked, as `Candidate.error`, shape (n,) [-]."""
         residual = self.columns["residual"]
-        # The smallest of many uncertain estimates is too optimistic, so a wide band worsens the rank of a candidate.
+        # A wide error band worsens the rank of a candidate, because the smallest of many estimates is too optimistic.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -236,7 +236,7 @@ class Judged:
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of many modes that saves little, because it lies shortly before td."""
+        """True for each candidate that is judged with many modes and saves little, because it is close to td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
@@ -253,7 +253,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Return the row numbers of the candidates without objections, ascending."""
+        """Return the candidates in the given ``rows``, without the objections."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
@@ -347,7 +347,7 @@ class Candidates(Sequence[Candidate]):
             name: _replace_nan(column[i].item())
             for name, column in judged.columns.items()
         }
-        # True if the deformations at tr and td were compared
+        # The value is True if the deformations at tr and td were compared.
         is_compared = values["sign_match"] is not None
         values["sign_match"] = values["sign_match"] > 0 if is_compared else None
         history = situation.history

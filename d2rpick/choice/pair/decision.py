@@ -21,14 +21,15 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
 
-# Cures for a pair that is not admissible. CHOOSE_ANOTHER is for any pair, CHECK_SWITCHED_RUN for a
-# recommended pair that its finished switched run contradicts.
+# CHOOSE_ANOTHER: cure for a pair that is not admissible.
+# CHECK_SWITCHED_RUN: cure for a recommended pair that a finished switched run contradicts.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
-# What to do if the pair is the best of all td in a range: by whether it can be used, after naming the range.
+# _USE_BEST: cure for a pair that can be used with care and is the best in the given range of td.
+# _AVOID_BEST: cure for a pair that cannot be used although it is the best in the given range of td.
 _USE_BEST: Final = (
     "use this pair if only the motion matters, compare it with a finished switched run (d2rpick verify), "
     "or make fewer parts rigid (d2rpick parts)"
@@ -101,7 +102,7 @@ class Decision(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """Reason for a verdict that is not "use", without the numbers of this pair: what several pairs can share."""
+        """Reason for a verdict that is not "use", without numbers, so that several pairs can share it."""
         if self.objections:
             return "; ".join(self.objections)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
@@ -114,7 +115,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration keeps the verdict from being better, though its grade was raised already."""
+        """True if the vibration limits the verdict although its grade was raised because its error hardly matters."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade

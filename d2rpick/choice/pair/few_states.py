@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# LS-DYNA usually writes these files more often than a d3plot.
+# Files that LS-DYNA usually writes more often than a d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
 def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if the states up to td are too few for the level at td: fewer than 10 per visible period.
+    """Yield a warning if fewer than 10 states per visible period are too few to determine the energy level at td.
 
     If no period is visible, the output may be too coarse to show any, since a d3plot has a few hundred states at most.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-# The grades in ascending order.
+# The following three grades of a pair are in ascending order.
 POOR: Final = "poor"
 FAIR: Final = "fair"
 GOOD: Final = "good"

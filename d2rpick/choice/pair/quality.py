@@ -28,33 +28,33 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History, Samples
 
-# Deformation errors that exceed the smallest by at most this are treated as equal [-]; the earliest safe tr is chosen.
+# Deformation errors that exceed the smallest error by at most this are treated as equal [-].
 EQUALLY_GOOD = 0.02
-# Level errors that differ by at most this are treated as equal [-], because the level predicts the mean energy after
-# td to 10 % at best. A shift of td within the margin changes it by as much, and a timing tolerance allows as much.
+# Level errors that differ by at most this are treated as equal [-].
+# Smaller differences do not matter, because the level predicts the mean energy after td to 10 % at best.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Largest level error that rounding causes at a crossing [-], for levels above this share of the highest energy.
+# Largest level error that rounding may cause at a crossing, for levels above this share of the highest energy [-].
 ROUNDING: Final = 1e-3
-# Errors are compared to this many decimals. Pairs with equal errors, as in all cycles of a single mode,
-# differ only by rounding, which must not determine their order.
+# Errors are compared after rounding to this many decimals, so that round-off does not determine the order of pairs.
 _DECIMALS: Final = 4
-# Rigid times within this share of the longest are treated as equal [-]; a small position error is then preferred.
+# Rigid times that differ from the longest by at most this share are treated as equal [-].
 _LIKE_TIMES = 0.1
 
-# Largest residual of a good pair [-]: the default tolerance for tr.
+# Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
-# Largest residual of a good pair, including what a hidden mode may add to it [-]; a good grade is a promise.
+# Largest upper bound of the residual of a good pair [-], which includes the effect of a mode hidden in the misfit.
 _MOST_HIDDEN: Final = 0.3
-# An energy has crossed its mean once it exceeds it by this share of the standard deviation. Less may be noise.
+# An energy has crossed its mean only if it then deviates from it by this share of the standard deviation [-].
 _BAND: Final = 0.25
-# Limits of the energy of the vibration error, as a share of the energy of the next contact [-].
-# A pair below _HARDLY_GOOD is good, a pair below MOST_WORTH_OF_FAIR is fair
-# (docs/explanation/validation-vibration.md).
+# The following limits of the vibration error are explained in docs/explanation/validation-vibration.md.
+# _HARDLY_GOOD: a pair is good if the energy of its error is below this share of the energy of the next contact [-].
+# MOST_WORTH_OF_FAIR: a pair is fair if the energy of its error is below this share of the energy of the contact [-].
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Number of states in a flight at which its vibration is resolved and crossings are found within 0.5 % of the flight.
+# Number of states with which a flight is resolved; the cure for fewer states is an output interval that gives as many.
 _ENOUGH_STATES: Final = 200
-_NAMED: Final = 5  # largest number of parts that a sentence names
+# Largest number of parts that are named in a sentence.
+_NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
@@ -121,16 +121,16 @@ def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
 def is_within_band(
     error: Samples, expected: Samples, error_of_best: Samples, best: Samples
 ) -> NDArray[np.bool_]:
-    """Return True for each pair that the band of the best one does not tell from it; all arguments have shape (n,) [-].
+    """Return True for each pair that cannot be distinguished from the best one within its error band.
 
+    All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
     A pair is expected to be no worse than the error of the best one, and its own error is no worse than the upper bound
     of that.  It is also on the same side of the limits of a grade, and of a release without any vibration.
     """
     limit = np.maximum(error_of_best, best)
-    with np.errstate(
-        invalid="ignore"
-    ):  # No bound is known where all errors are infinite.
+    # Warnings are not needed, because the bound is unknown if all errors are infinite.
+    with np.errstate(invalid="ignore"):
         highest = np.sqrt(np.fmax(2 * error_of_best**2 - best**2, limit**2))
     for bound in (POOR_RESIDUAL, NOTHING_KEPT):
         limit = np.where(best <= bound, np.minimum(limit, bound), limit)
@@ -138,7 +138,7 @@ def is_within_band(
 
 
 class Errors(NamedTuple):
-    """Errors of n candidates, each of shape (n,): the ``error`` that ranks them, and what of it is ``expected`` [-].
+    """Errors of n candidates, of shape (n,): the ``error`` by which they are ranked, and the ``expected`` error [-].
 
     The two differ by half of the band.  ``is_good`` is True for candidates that are all equally good.
     """
@@ -382,7 +382,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def _ask_for_more_states(situation: Situation) -> Iterator[str]:
-    """Yield the output interval to ask for if few states lie in the flight up to td."""
+    """Yield a request for a shorter output interval if too few states lie in the flight up to td."""
     start = situation.flight.start
     begin = float(situation.history.time[0]) if start is None else start
     states = situation.history.between(begin, situation.td)[0].size
@@ -407,7 +407,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Return the cause "the vibration after td is wrong", with the cure: to change tr or td."""
+    """Return the cause "the vibration after td is wrong", with its cure, which is another tr or td."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:

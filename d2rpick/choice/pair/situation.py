@@ -47,11 +47,11 @@ if TYPE_CHECKING:
 
 # Largest error of the energies that a solver writes, as a share of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# A fluctuation below this share of the largest vibration energy after the load is ignored: 1 % of the amplitude.
+# A fluctuation below this share of the largest vibration energy after the load is ignored [-].
 _FAINT: Final = 1e-4
-# An oscillator that describes this share of the record is used; no modes are searched for that describe more of it.
+# If an oscillator describes at least this share of the record, no modes are searched for [-].
 _MOST_OF_RECORD: Final = 0.5
-# Rounding error in units of the last digit: a constant energy may alternate between two printed values.
+# Rounding error in units of the last digit, because a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
 
@@ -69,9 +69,10 @@ def is_at_rest(
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    if inside.size < MIN_SAMPLES_PER_PERIOD:  # too few samples for a vibration
+    # With so few samples, a vibration cannot be seen.
+    if inside.size < MIN_SAMPLES_PER_PERIOD:
         return False
-    # this is 0 if no energy is written at all
+    # The rounding error is 0 if no energy is written at all.
     rounding = round_off(history)
     if rounding > 0 and float(np.abs(inside).max()) <= rounding:
         return True
@@ -100,7 +101,7 @@ def _find_highest_energy(history: History) -> float:
 
 
 class AnswerAtTd:
-    """Base class of the answers about one td; ``situation`` describes that td."""
+    """Base class of all answers about a td, which ``situation`` describes."""
 
     situation: Situation
 
@@ -169,7 +170,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # NaN, because the fraction is undefined without a vibration
+        return share  # The share is NaN if it is undefined for lack of a vibration.
 
     @property
     def earliest_tr(self) -> float | None:
@@ -224,7 +225,7 @@ class Situation:
         return self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors to which the tolerance applies, in the shape of ``times`` [-]; 0 if nothing vibrates."""
+        """Return the errors that the tolerance limits, in the shape of ``times`` [-]; 0 if nothing vibrates."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
 
     @property
@@ -299,7 +300,7 @@ def examine_td(
     quiet: QuietTime | None = None
     is_given = settings.oscillator is not None or settings.fit_window is not None
     if not (is_shown or _covers_most(history, described) or (described and is_given)):
-        # Only the energy can show a flight, or more of it than an oscillator describes.
+        # The energy is the only evidence of a flight, or shows a longer flight than the oscillator.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -365,8 +366,7 @@ def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
         # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window
 
-        # The energy alone shows a slightly different flight for each td. Modes are therefore identified in a few
-        # windows that many td share.
+        # The energy shows a slightly different flight for each td, so modes are identified in windows that td share.
         inner = get_inner_window(history, in_flight)
         in_flight = inner if inner.start < situation.td <= inner.end else in_flight
     return find_models(history, in_flight, settled, together=situation.together)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class PartsTogether:
-    """Parts that vibrate together in a flight: whether all of them were chosen, and their kinetic energy."""
+    """The parts that vibrate together in a flight, whether all of them were chosen, and their kinetic energy."""
 
     def __init__(self, history: History, flight: Flight) -> None:
         self._history, self._flight = history, flight

@@ -36,24 +36,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# With fewer states per energy period than this, undetected faster modes may matter.
+# Smallest number of states per energy period with which faster modes are detected.
 _FEW_STATES = 4
-# If the kinetic fraction exceeds this, more than half of the vibration is lost at td for every tr [-].
+# If the kinetic fraction at td exceeds this, every tr loses more than half of the vibration energy [-].
 POOR_KINETIC_SHARE = 0.5
-# A pair with a larger residual is poor [-]. At 0.5 the error has 25 % of the vibration energy,
-# and is visible in the motion after td.
+# A pair with a larger residual is poor [-], because its error has more than 25 % of the vibration energy.
 POOR_RESIDUAL = 0.5
-# A plastic energy above this share of the vibration energy gets a warning [-], since it may also be a preload.
+# A warning is issued if the plastic energy exceeds this share of the vibration energy [-]; it may be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Assumed static energy as a share of the lowest energy in flight [-], since many modes are never at rest together.
-# With it, the predicted mean energies after td have errors of up to 0.03 in 12 switched runs of a car,
-# and of -0.05 to 0.16 for a shell box. With a share of 1 they would be up to 0.09 and 0.19 too high.
+# Assumed static energy as a share of the lowest energy in flight [-], as many modes are never all at zero deformation.
+# With this share, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
+# For a shell box, the errors of the mean energies were -0.05 to 0.16 with this share.
 _AT_REST = 0.85
-# Largest mean energy after td relative to the reference run [-]. Switching adds no energy,
-# so a larger ratio means that there is a contact in the flight. The estimate itself is accurate to 20 %.
+# Largest mean energy after td relative to the reference run [-], which may exceed 1 because the estimate is inexact.
+# Switching adds no energy, so a larger ratio shows that there is a contact in the flight.
 MOST_KEPT = 1.2
-# largest exponent of e that does not overflow
+# Largest exponent with which the exponential function does not overflow.
 _LARGEST_EXPONENT = 700.0
 
 
@@ -159,7 +158,8 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    elif td <= earliest and not flight.refusal:  # the refusal says it already
+    # If there is a refusal, it already contains this message.
+    elif td <= earliest and not flight.refusal:
         yield Caution(
             "td-in-load",
             f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {describe_end_of_load(situation)}",
@@ -541,7 +541,7 @@ def list_objections(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # After the end of the flight, its energy says nothing about the time after td.
+    # For a td after the end of the flight, the energy in the flight does not predict the motion after td.
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
@@ -591,7 +591,7 @@ def _tell_undescribed(
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
-    """Return the same objection for every candidate."""
+    """Return an objection that is the same for every candidate."""
     return [reason]
 
 
@@ -609,7 +609,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate keeps less of the vibration than a release without any vibration."""
+    """Return the objection that a candidate is worse than a release without any vibration."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -635,7 +635,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that a switch is worse than a release without vibration, or than the best switch at this td."""
+    """State that a pair is worse than a release without vibration, or than the best pair at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

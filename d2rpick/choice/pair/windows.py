@@ -22,14 +22,13 @@ if TYPE_CHECKING:
     # A test of times, which returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of bisections at the end of a window, which make the end accurate to 1e-6 of the sampling interval.
+# Number of bisections that locate the end of a window, to 1e-6 of the sampling interval.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
-# Largest error of the polyline [-]: half of the last printed digit.
+# Largest deviation of the error from its polyline [-], which is half of the last printed digit.
 _EXACT: Final = 5e-4
-# Number of times that an interval is halved if the error in it is curved. A square root at zero energy is then
-# accurate to 1/4000, and a parabola is far more accurate.
+# Largest number of times that an interval is halved if the error in it is curved.
 _HALVINGS: Final = 20
 
 
@@ -174,7 +173,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # Between samples the energy may exceed the largest acceptable value, so crossings just below it are added.
+    # Crossings just below the largest acceptable energy are added, because the energy may exceed it between samples.
     highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Relative error of CPU times (5 %) over the relative error of the measured ratios of weights (50 %) [-].
+# Relative error of CPU times (5 %) divided by the relative error of the assumed ratios of weights (50 %) [-].
 _DOUBT: Final = 0.1
-# The legs determine a weight if they contribute more than this share to its value, given the errors above [-].
+# The restart segments determine a weight if they contribute more than this share to its value [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 

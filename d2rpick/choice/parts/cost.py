@@ -27,18 +27,16 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost of an element per cycle [us]: for shells with one integration point, and "point" for each further one.
-# The costs were fitted to runs of a car with 1516 elements after its first impact, with and without rigid parts.
-# All shells of a run had the same formulation (OpenRadioss 2026-08, one thread; docs/reference/cost-model.md).
-# The fit does not separate the costs of beams and springs well.
+# Cost of an element per cycle [us]; a shell costs "point" more for each integration point after the first.
+# These costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
+# The costs of beams and springs are less accurate than the other costs.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Share of the elements in the cost of a deformable step [-]: 0.88 for the elements themselves,
-# plus 0.03 to 0.04 for their assembly, contact and output.
+# Share of the elements in the cost of a deformable step [-], including their assembly, contact and output.
 ELEMENT_SHARE: Final = 0.91
-# Cost per rigid-body node and cycle [us], fitted to the same runs.
+# Cost per rigid-body node and cycle [us], fitted to the same runs as the element costs.
 RIGID_NODE: Final = 0.04
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
 # Upper limit of a cost, so that sums over all elements stay finite. Real costs are far smaller in any unit.
@@ -89,7 +87,7 @@ def _check_weight(name: str, value: float) -> None:
 def compute_saved_share(
     weights: Weights, total: float, rigid: float, nodes: int
 ) -> float:
-    """Return the share c of a step's cost that is saved while elements with a total cost of ``rigid`` are rigid [-].
+    """Return the share of a step's cost that is saved while elements with a total cost of ``rigid`` are rigid [-].
 
     Parameters
     ----------
@@ -162,7 +160,7 @@ class CostModel:
         )
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Return the share c of a step's cost saved while ``parts`` are rigid [-]; unknown if the deck lacks a part."""
+        """Return the share of a step's cost saved while ``parts`` are rigid [-]; unknown if the deck lacks a part."""
         absent = sorted(set(parts) - self.inventory.parts.keys())
         if absent:
             return Share(
@@ -314,7 +312,8 @@ def _quote_for_toml(text: str) -> str:
     """Quote a string for a TOML file."""
     import json
 
-    return json.dumps(text, ensure_ascii=False)  # TOML does not allow surrogate pairs
+    # JSON escapes would contain surrogate pairs, which TOML does not allow.
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _parse_weight(path: str, name: str, value: object) -> float:

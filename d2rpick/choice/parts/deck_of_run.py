@@ -1,4 +1,4 @@
-"""Apply the deck of a run: rigid bodies, supports, gravity and costs, and doubts about the deck.
+"""Apply the deck of a run: rigid bodies, supports, gravity and costs, and warnings about the deck.
 
 If the deck belongs to another model, its part ids do not match the run, so nothing from it is used.
 """
@@ -58,7 +58,7 @@ def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
     """Return the single rigid body of merged parts, regardless of the ``bodies`` they would become."""
-    # A single part may consist of disconnected pieces.
+    # A single part is one connected body only if it has no disconnected pieces.
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
@@ -247,7 +247,7 @@ def add_deck_to_settings(
             open_ = [Caution("cost-unknown", f"the CPU time is not estimated: {why}")]
         else:
             open_ = []
-        # parts in an include that is missing cannot be named
+        # Parts in a missing include file cannot be named.
         unread = warn_about_cost(model, used=False)
         return replace(settings, bodies=()), (*doubts_of_parts, *unread, *open_)
     is_computed = settings.cost_share is None
@@ -330,7 +330,7 @@ def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _sum_gravity(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Return the possible values of the sum of several loads; None if the sum is unknown."""
+    """Return the possible values of the sum of several gravity loads; None if the sum is unknown."""
     if len(loads) < 2:
         values = loads[0].values if loads else ()
         return tuple(sorted({abs(value) for value in values} or {0.0}))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
 
-# Freezing a body is tried at this many times in a flight, which suffices because its internal motion is slow.
+# Number of times in a flight at which making a body rigid is tried; few suffice, because internal motion is slow.
 _TIMES: Final = 100
 
 

@@ -30,14 +30,13 @@ if TYPE_CHECKING:
 
 
 # A part has stopped deforming if the standard deviation of its energy in flight is below this share of the mean [-].
-# Most of its energy is then plastic work, and only a small part is vibration energy.
 STOPPED: Final = 0.1
 # Duration of the first phase of a landing, as a share of the flight before it [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# A part takes the landing alone, as a bumper or a skid does, if it absorbs at least this share of the energy at
-# first [-], and has at most the other share of the cost [-], so that it may stay deformable.
+# LANDING_ALONE: a bumper or skid absorbs at least this share of the energy at the start of the landing [-].
+# _CHEAP: a bumper or skid that stays deformable has at most this share of the cost of all elements [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
@@ -163,7 +162,7 @@ def _is_flying(
 def _measure_in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
-    """Return the mean, change and scatter of a part's energy in a flight, and its energy in the landing."""
+    """Return the mean, change and standard deviation of a part's energy in flight, and its energy in the landing."""
     inside = energy[find_window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)

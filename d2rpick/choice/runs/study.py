@@ -55,17 +55,17 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "out-of-range",
     "failed",
 )
-# Distance of Tukey's fences from the quartiles, in interquartile ranges [-].
+# Distance of Tukey's fences, beyond which a value is an outlier, from the quartiles, in interquartile ranges [-].
 _FENCE: Final = 1.5
 # Largest number of runs named in a sentence.
 NAMED: Final = 3
-# Share of the rigid time that may be given up to get a tr with fewer digits [-].
+# Share of the rigid time that may be lost by rounding tr to fewer digits [-].
 _ROUNDED: Final = 0.001
 # Codes of warnings about single runs that a study does not repeat, because the row of the run shows them.
 _NOT_REPEATED = ("no-candidate",)
-# A record that ends before this share of the median end time was cut off [-], since variants have equal end times.
+# A record is treated as cut off if it ends before this share of the median end time of all runs [-].
 _WHOLE: Final = 0.99
-# Number of pieces of a drawn curve, each with its lowest and highest energy. It is twice what is visible.
+# Number of intervals into which a drawn curve is divided; only the lowest and highest energy in each are drawn.
 _STRETCHES = 200
 
 
@@ -88,7 +88,7 @@ class Question:
 
 
 class Stamp(NamedTuple):
-    """State of a file when its run was read: size in bytes, modification time in nanoseconds."""
+    """Size in bytes and modification time in nanoseconds of a file when its run was read."""
 
     name: str
     size: int
@@ -195,7 +195,7 @@ class StudyOfRuns:
         for row, error in zip(self.runs, self.common.errors, strict=True):
             if error is None or row.residual is None or row.basis == "energy":
                 continue
-            # The run's own pair may have a better grade than its residual suggests, if the error hardly matters.
+            # The grade at the common tr is used only if it is worse than the grade of the residual at the run's own tr.
             at_common_tr = grade_residual(error)
             if GRADES.index(at_common_tr) < GRADES.index(grade_residual(row.residual)):
                 grades.append(at_common_tr)
@@ -358,7 +358,7 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 
 def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
     """Return the groups of judged runs that were read from the same files, or from files with the same content."""
-    # Files are compared only if their sizes and the answers are equal, which different runs hardly ever have.
+    # The contents of files are compared only if the sizes of the files and the answers for the runs are equal.
     alike: dict[tuple[Any, ...], list[StudyRow]] = {}
     for row in rows:
         if row.judged and row.files:
@@ -474,7 +474,7 @@ def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
 
 
 def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
-    """Return the median tr of runs that agree, limited to their accuracy; None if they do not agree."""
+    """Return the median tr of runs that agree, moved into the interval common to all; None if they do not agree."""
     tr_of_runs, low, high = _find_common_interval(judged)
     if len(tr_of_runs) < len(judged) or low > high:
         return None

@@ -27,18 +27,16 @@ if TYPE_CHECKING:
 
 # The motion after td is different if the momentum deviates by more than this share of the momentum [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Smallest reference for a relative deviation, as a share of the largest momentum [-]; a body may be at rest.
+# Deviations are divided by at least this share of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
-# If the energies while rigid and at td differ by more than this share [-], and by more than energies usually change
-# between states, a note says so. Some solvers report a wrong energy for rigid solid elements.
+# A note is issued if the energy reported while rigid differs from the energy at td by more than this share [-].
+# The reason for the note is that some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# An energy is treated as constant if it changes by less than the share _STILL of the energy
-# and the share _STILL_OF_VIBRATION of the vibration energy [-].
-# The energy of a rigid body is constant to its printed digits,
-# whereas vibration changes it more between states; but the vibration may be small against plastic work.
+# _STILL: an energy is constant if it changes by less than this share of the energy [-].
+# _STILL_OF_VIBRATION: the change must also be less than this share of the vibration energy [-].
+# The second limit is needed because the vibration energy may be small compared with plastic work.
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
-# Relative tolerance for the energy near tr [-]: a solver switches at the first step after tr,
-# which may be a state or two away from the nearest output.
+# Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
 # Number of times between two states at which the switch to rigid is searched for.
 _BETWEEN: Final = 101
@@ -140,7 +138,7 @@ def compare_runs(
     is_reported: bool = True,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a switched run with its reference run: whether it was rigid from tr to td, and its energy after td.
+    """Check whether a switched run was rigid from tr to td, and compare its energy after td with the reference run.
 
     Parameters
     ----------
@@ -215,7 +213,7 @@ def compare_runs(
 def _select_energies_after(
     switched: History, td: float, end: float
 ) -> tuple[Samples, float | None]:
-    """Return the energies of the switched run from td to ``end``, and a wrong one of the rigid parts before them.
+    """Return the energies of the switched run from td to ``end``, preceded by a wrong energy of the rigid parts if any.
 
     The second value is the energy that the solver reports while the parts are rigid, None if it is right.
     """
@@ -256,7 +254,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the change up to which an energy is constant [energy]: a share of the vibration, or its rounding error."""
+    """Return the change up to which an energy is constant [energy]: a small share of it, or its rounding error."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -328,7 +326,7 @@ def _check_locked_in_energy(
 ) -> Iterator[str]:
     """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # without a vibration the relative error has no meaning
+        return  # The error relative to the vibration energy has no meaning.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -374,7 +372,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     energy = switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     rounding = round_off(reference)
-    # Energies that are only round-off, as of rigid or resting parts, change during a fall.
+    # The energies of rigid or resting parts are only round-off, which may change during a fall.
     unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)
     still = find_stretches(np.append(False, unchanged), FEWEST)
     spans = [(max(span.start - 1, 0), span.stop - 1) for span in still]

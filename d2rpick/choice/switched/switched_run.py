@@ -1,4 +1,4 @@
-"""Analyse a switched run: when its parts were rigid, which parts can be compared, and how its landings moved.
+"""Analyse a switched run: when its parts were rigid, which parts can be compared, and when it landed.
 
 While solids are rigid, some solvers report a sum of energy densities for them, and some do so even afterwards.  A
 frozen deformation does not change, so a part that is deformable again should have its energy of tr.  If the energy
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Kinds of evidence that locate the start of a flight within a few states. The energy alone is less accurate.
+# Kinds of evidence that determine the start of a flight to within a few states; the energy alone does not.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # The parts are treated as not moving if they carry less than this share of the momentum of the model [-].
 _HARDLY: Final = 0.1
 # A part was rigid if it has no kinetic energy, or constant internal energy, in this many consecutive states.
 FEWEST: Final = 12
-# Relative change below which an internal energy is constant: solvers write single precision [-].
+# Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
 SAME: Final = 1e-6
 # A flight that begins within this number of output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
@@ -295,7 +295,7 @@ def _warn_about_deforming(
 
 
 class _AbsentWindow(NamedTuple):
-    """A window in which the ``rigid`` parts have no energies [time]; ``whole`` if no other part deforms."""
+    """A window in which the ``rigid`` parts have no energies [time]; ``whole`` is True if no other part deforms."""
 
     start: float
     end: float

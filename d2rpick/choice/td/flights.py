@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # A vibration without contacts is searched for at these times, as shares of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-# Rigid windows below this share of the record are left out [-], since they save less than a restart costs.
+# Shorter rigid windows, as a share of the record, are left out [-] because they save less than a restart costs.
 MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
@@ -197,11 +197,11 @@ def _find_flights_without_landing(
             flight = look(first + share * (history.end - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # This flight ends with the vibration, even if its start is given.
+                # The flight ends when the vibration ends, even if the user gives the start of the flight.
                 return (flight,)
         look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
-    # The quiet time around the latest td covers most of the flight.
+    # The quiet time around the latest td is used, because it covers most of the flight.
     for td in sorted(list_moments(history.time), reverse=True):
         if flights and flights[-1].start is not None and td > flights[-1].start:
             continue

@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 # A window is left out if a later window is longer by more than this factor [-].
-# With both windows, of lengths w and W, the next run saves w and the run after it w + W.
-# With only the later window both runs save W, which is more in total if W > 2 w.
+# The factor follows from the rigid time in the next two runs, with a window of length w and a later one of length W.
+# If both windows are used, the first run is rigid for w and the second run is rigid for w + W.
+# If only the later window is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
 
 

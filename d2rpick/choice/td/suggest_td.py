@@ -39,22 +39,21 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# Number of highest energy peaks and of last energy peaks that are tried. At the highest peaks several modes have little
-# kinetic energy, and the last peaks save most.
+# The best td are searched for at this many of the most promising energy peaks, and at as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# For many modes the smallest residual is searched for among windows with at least these shares of the longest one [-].
+# For many modes, the smallest residual is searched for among windows at least this long, relative to the longest [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
-# Good windows with at least this share of the longest one are treated as equally long [-]; the residual then decides.
+# Good windows are treated as equally long if they have at least this share of the length of the longest [-].
 _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in an even grid. A curve with this many points looks smooth on paper and on a screen.
+# Number of td in a uniform grid, which suffices for a smooth curve on paper and on a screen.
 STEPS: Final = 200
 # number of decimals of an error that are shown to the user
 _READ: Final = 3
-# A longer pair is mentioned if it exceeds the recommended one by this share of the window [-].
+# A pair is mentioned if it is rigid for longer than the recommended one, by at least this share of the td range [-].
 _MUCH: Final = 0.1
-# Safety factor on the spread of the contact time that follows from the energy, since a constant energy may hide many
-# vibrating modes. In 20 computed falls a factor of up to 1.9 was needed.
+# Safety factor on the uncertainty of the contact time that is estimated from the energy [-].
+# The factor is needed because modes can vibrate without changing the energy; 20 computed falls needed up to 1.9.
 _HIDDEN: Final = 2.0
 
 
@@ -192,7 +191,8 @@ def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
     """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # td must be after the first time
+    # The grid omits the first time, because td must be after it.
+    grid = np.linspace(*window, steps + 1)[1:]
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         intervals = np.searchsorted(grid, peaks)
@@ -272,7 +272,7 @@ def _find_unbeaten(
 
 
 def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
-    """Return True if a pair at the td of a situation may have an error and a rigid time as good as given.
+    """Return True if a pair at the td of a situation may be as good as given, in error and in rigid time.
 
     Pairs by deformations are not compared with pairs by levels.
     """
@@ -349,7 +349,7 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
     """
     history = situation.history
     flight = situation.flight
-    # a run that ends at td is useless
+    # td must not be the last state, because a run that ends at td is useless
     last = min(window[1], round_down_as_read(float(history.time[-2])))
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
@@ -460,13 +460,13 @@ def _choose_by_modes(
 
 
 def _is_good(pair: Pair) -> bool:
-    """Return True if the residual of a pair is that of a good one."""
+    """Return True if the residual of a pair is small enough for the grade "good"."""
     residual, highest = np.array([pair.residual, pair.residual_high], np.float64)
     return bool(is_good_residual(residual, highest))
 
 
 def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs whose error the band of the best one leaves open, or that is hardly larger."""
+    """Return the pairs whose error is hardly larger than the smallest, or not larger within its uncertainty."""
     errors = np.array([pair.error for _, pair in pairs])
     highest = np.array([pair.residual_high for _, pair in pairs], np.float64)
     doubted = np.sqrt((errors**2 + np.fmax(highest, errors) ** 2) / 2)
@@ -477,7 +477,7 @@ def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
-    """Return the choice with the smallest error among those that are hardly shorter than the longest."""
+    """Return the choice with the smallest error among the choices that are hardly shorter than the longest one."""
     longest = max(pair.rigid_time for _, pair in pairs)
     long = [choice for choice in pairs if choice[1].rigid_time >= _LONG * longest]
     return min(long, key=lambda choice: (choice[1].error, -choice[1].rigid_time))
@@ -504,7 +504,7 @@ def _list_times_by_modes(
         for td in times.tolist()
     ]
     errors, tr = np.array(rows).T
-    # Half of the half-width is added, since the smallest of many estimates is too optimistic.
+    # Half of the uncertainty is added to each estimate, because the smallest of many estimates is too optimistic.
     squares = errors**2 + kinetic_share(modes, times) + modes.half_width(tr, times) / 2
     middle = squares[1:-1]
     is_lowest = (middle <= squares[:-2]) & (middle < squares[2:])
@@ -539,7 +539,7 @@ def _choose_by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, compute_shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    # No oscillator is searched for at each td, which would take long.
+    # Fitting an oscillator at each td would take too long.
     best = next((td for td in below if _select_acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
@@ -579,7 +579,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, the last one if several are equal; None without choices."""
+    """Return the choice with the longest rigid time, or the last of several equal ones; None without choices."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

@@ -46,19 +46,19 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Another td is mentioned if its error is at most this share of the error at the given td [-], as displayed.
+# Another td is mentioned if its displayed error is at most this share of the displayed error at the given td [-].
 _MUCH_LESS: Final = 0.5
-# A pair that keeps less than this share of the rigid time is not compared [-].
+# Another pair is mentioned only if its rigid time is at least this share of that of the given pair [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td on the grid of a page. They are a few pixels apart, and finer than the steps of a slider.
+# Number of td on the grid of a page, at which a curve has a point every few pixels.
 _STEPS_OF_PAGE: Final = 120
-# Fewest td per flight if a plan has many flights. A curve with fewer points shows little.
+# Smallest number of td per flight if a plan has many flights.
 _FEWEST_STEPS: Final = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
-    """The answer of ``suggest`` for one td; most of it is computed only on access.
+    """The answer of ``suggest`` for one td. Most of its values are computed only when they are used.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
     offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
@@ -453,5 +453,5 @@ def explore_around(
             steps=steps,
             since=since,
         )
-    except RangeError:  # There is no state in the window.
+    except RangeError:  # The history has no state in this range of td.
         return None
