@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # _ALIKE: an acceleration is gravity within this relative deviation [-]; 1 load in 200 comes so close by chance.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Rounding error of the fitted change of momentum, in rounding errors of the momentum, which fitting amplifies [-].
+# Ratio of the rounding error of the fitted change of momentum to that of the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
 # _ROUGHLY: relative tolerance for the size of gravity while a load fades [-].
 # _ALONG_AXIS: while a load fades, gravity has at least this direction cosine with an axis [-].

@@ -275,7 +275,7 @@ def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _count_verdicts(answer: StudyOfRuns) -> str:
-    """Count for each verdict the runs whose own pair has it."""
+    """Count the runs with each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {format_number_of_runs(counts[word])}"

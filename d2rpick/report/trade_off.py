@@ -256,7 +256,7 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 
 
 def _explain_why_no_pair(trade_off: TradeOff) -> str:
-    """Explain why no td has an acceptable pair, for the example of the td with the highest energy."""
+    """Explain why no td has an acceptable pair, using the td with the highest energy as an example."""
     if not trade_off.offers:
         return "no td in the range has an admissible tr"
     highest = max(trade_off.offers, key=lambda offer: offer.energy_td)

@@ -219,7 +219,8 @@ def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
         return {}
     files = {}
     for path in (*paths, *find_later_legs(paths)):
-        with suppress(OSError):  # The file may not exist yet, or no longer.
+        # The file may not exist yet, or it may have been removed.
+        with suppress(OSError):
             status = Path(path).stat()
             if status.st_size:
                 files[path] = WatchedFile(

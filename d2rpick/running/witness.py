@@ -157,7 +157,7 @@ class GrowingWitness:
         )
 
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the first state from ``earliest`` on since which no force shows up to ``last``."""
+        """Return the state, not before ``earliest``, from which the states up to ``last`` show no force."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(

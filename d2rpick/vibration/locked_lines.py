@@ -38,7 +38,7 @@ _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class StretchLine(NamedTuple):
-    """The ``line`` due to a static deformation, about which the mode of the line ``of_mode`` vibrates.
+    """The ``line`` that arises because the mode of the line ``of_mode`` vibrates about a static deformation.
 
     ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
     ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.

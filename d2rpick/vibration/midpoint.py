@@ -96,7 +96,7 @@ class Reading:
         """Return how damping changes the vibration energy of each mode within a period; it acts only during motion."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
-        # The change is z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), the real part of a complex weight for each line.
+        # With the damping ratio z, the change at the phase theta is z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta).
         turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 

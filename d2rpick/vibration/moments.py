@@ -107,12 +107,12 @@ class SampledEnergy:
         return np.zeros(0)
 
     def reach(self, times: Samples) -> Samples:
-        """Return how far from each time the energy may equal that at td [time]."""
+        """Return the uncertainty of each time at which the energy equals the energy at td [time]."""
         return compute_sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
 class OscillatorEnergy(SampledEnergy):
-    """The ``mode`` of a ``fit`` that describes a record in ``span``, for a ``td`` in the span."""
+    """The ``mode`` of a ``fit`` that describes a record in the window ``span``, for a ``td`` in this window."""
 
     mode: Mode
 
@@ -190,7 +190,7 @@ class OscillatorEnergy(SampledEnergy):
         return times[self.within(times)]
 
     def edges(self) -> Samples:
-        """Return standstills and ends of the span, between which the energy is monotone [time]."""
+        """Return the extrema of the energy and the ends of the span, between which the energy is monotone [time]."""
         return np.concatenate(
             [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
         )

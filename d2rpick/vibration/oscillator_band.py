@@ -66,7 +66,7 @@ def residual_band(
 
 
 def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a hidden damped mode that has opposite extremes at tr and td [-]."""
+    """Return R^2 of a hidden damped mode whose deformations at tr and td are opposite extremes [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
 

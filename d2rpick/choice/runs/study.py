@@ -182,7 +182,7 @@ class StudyOfRuns:
 
     @property
     def energy_unit(self) -> str:
-        """Unit of the energies; empty if the judged runs do not name the same one."""
+        """Unit of the energies; empty if the judged runs name different units."""
         units = {row.energy_unit for row in self.runs if row.judged}
         return units.pop() if len(units) == 1 else ""
 
