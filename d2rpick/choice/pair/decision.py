@@ -225,7 +225,7 @@ def _explain_raised_grade(quality: Quality) -> str:
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Format the bounds of the mean energy; as one number if both are displayed alike."""
+    """Format the bounds of the mean energy, as one number if both are displayed alike."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
