@@ -285,7 +285,7 @@ def plan(
     >>> import d2rpick as d2
     >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="flying")
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
-    [(0.143, 0.345)]
+    [(0.124, 0.37)]
     """
     times = TimeArguments.of_run(run)
     shortest = times.check_time("min_rigid", min_rigid, NOT_NEGATIVE)

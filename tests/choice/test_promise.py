@@ -93,7 +93,7 @@ def test_a_long_pair_is_not_taken_because_others_are_short(
 
 @pytest.mark.parametrize("percent", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_what_sinks_in_the_noise_is_not_promised(percent: int, tmp_path: Path) -> None:
-    """A residual of 0.8 was stated where the true one is 1.05, and one of 0.9 where it is 1.4: the lines say nothing."""
+    """A residual of 0.8 was stated where the true one is 1.05, and one of 0.9 where it is 1.4."""
     record = CLASSES[f"stiffness damping, {percent} % noise"](
         np.random.default_rng([101, 2])
     )
