@@ -280,7 +280,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable tr on basis "energy", in which any tr is as good as a crossing; None on other bases."""
+        """Windows of acceptable tr on basis "energy", in which all tr are equally good; None on other bases."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)

@@ -37,13 +37,13 @@ MOST_IMBALANCE = 0.10
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
 # _TINY_SHARE: internal energies below this share of the run's largest energy are treated as rounding errors [-].
-# The share follows from the precision of the files: single precision and glstat have six to seven digits.
+# _TINY_SHARE follows from the precision of the files: single precision and glstat have six to seven digits.
 # _FLOOR: internal energies below this are treated as 0 [energy]; LS-DYNA's start at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
 # Parts whose internal energy is below this share of the largest part energy are ignored [-].
 _SMALL_PART = 0.01
 # The energy ratio is used only while its reference energy exceeds this share of its peak [-].
-# Below this share, even a small error gives a large ratio (source: Altair, Radioss FAQ on the energy error).
+# If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
@@ -58,7 +58,7 @@ _UNRELIABLE: Final = "do not rely on the internal energy"
 # Sound runs do not meet them, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# The criteria need this many earlier states with energy, because the first states may contain only round-off.
+# Smallest number of earlier states with energy for recognising a diverged run; the first states may be round-off.
 _FEWEST: Final = 12
 # Energies below this value are treated as zero in any unit system, because LS-DYNA's energies start at 2e-20.
 _NOTHING: Final = 1e-20
@@ -324,7 +324,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # rounding error of the energy, from its number of printed digits
+            # The quantum is the rounding error of the energy, which depends on its number of printed digits.
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
@@ -399,7 +399,7 @@ def _describe_divergence(history: History) -> str | None:
         for energies in (kinetic + internal, internal)
     )
     gained = counted & (deformed > 0) & (kinetic > _GAIN * earlier_energy)
-    # The criteria compare quotients, because products might overflow.
+    # The factors are applied as divisors, because products of energies might overflow.
     gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)

@@ -1,4 +1,4 @@
-"""Find the frame of a body in flight: how its parts, or nodes whose motion is written, are rotated against the deck."""
+"""Find the frame of a body in flight: how its parts, or nodes with written motion, are rotated relative to the deck."""
 
 from __future__ import annotations
 

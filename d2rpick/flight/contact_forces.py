@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
 
 # An external contact changes the momentum of the model by at least this share of its impulse [-].
-# The share is small, because the output may miss up to 1/3 of the impulse of an intermittent contact.
+# The output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
 # _PIECES: number of pieces of a flight whose mean energies are compared.
 # _RISE: a mean energy that rises by this share of the highest energy shows a crash.
@@ -95,7 +95,7 @@ class Touches(NamedTuple):
 def _select_outer_forces(
     forces: Sequence[ContactForce], whole: Momenta
 ) -> list[ContactForce]:
-    """Return the forces whose impulses appear in the momentum of the model next to a constant gravity.
+    """Return the forces whose impulses change the momentum of the model, apart from a constant gravity.
 
     An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
     side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces

@@ -35,7 +35,7 @@ _OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """Periods in which a force acts: ``spans`` (from, to) [time], each end known to half an ``interval``.
+    """Periods in which a force acts: ``spans`` (from, to) [time], each end is accurate to half of ``interval``.
 
     ``speed`` is the speed of the parts at the end of the longest flight [length/time], None without masses.
     """

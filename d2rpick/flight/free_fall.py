@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # _ALIKE: an acceleration is gravity within this relative deviation [-]; 1 load in 200 comes so close by chance.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Rounding error of the fitted change of momentum, in rounding errors of the momentum, which fitting amplifies [-].
+# Ratio of the rounding error of the fitted change of momentum to that of the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
 # _ROUGHLY: relative tolerance for the size of gravity while a load fades [-].
 # _ALONG_AXIS: while a load fades, gravity has at least this direction cosine with an axis [-].
@@ -79,7 +79,7 @@ class Laws:
     def __init__(
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
-        """Prepare the laws for the parts in columns ``members``. The energies ``balance`` bound an unknown mass."""
+        """Prepare the laws of free flight for the parts in columns ``members``; ``balance`` limits an unknown mass."""
         time = momenta.time
         momentum = momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
@@ -192,7 +192,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield weights (3,) along an axis, found from the momentum at right angles to a load of constant direction."""
+        """Yield possible weights (3,) along an axis, from the momentum at right angles to a steadily directed load."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -471,7 +471,7 @@ class FreeFall(Law):
         )
 
     def _select_states(self, first: int, last: int) -> slice | NDArray[np.intp]:
-        """Return the states between two states to which the law is fitted."""
+        """Return the slice of states between two states to which the law is fitted."""
         return slice(first, last + 1)
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 # Share by which the energy band before td is widened, because it may not contain a complete vibration [-].
 _BAND_RESERVE: Final = 0.25
 # Share of the time before td that is not used for the energy band [-], because the load may still act in it.
-# In 45 computed runs, the energy entered its band too early by up to 0.3 of this time.
+# In 45 computed runs, the energy entered its band too early by up to 30 % of the time before td.
 _WAIT: Final = 1 / 3
-# _OUTER: share of the energies above, and share below, the central range that only contacts leave by far [-].
+# _OUTER: the lowest and the highest energies with this share of all energies are outside of the usual range [-].
 # _LATEST: share of the time before td in which the usual rate of the energy is measured [-].
 # _FASTER: a contact changes the energy at least this many times as fast as usual [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
@@ -47,7 +47,7 @@ _ROUND_OFF: Final = 1e-6
 # The energies in a flight stay in the band of its last quarter, widened by this share of the band's width [-].
 _RESERVE: Final = 0.5
 # The mean energies of the last two quarters of a flight differ by less than this share of the energy band [-].
-# For a steady drift this share is 1; for a vibration with 3/4 of a period in each quarter it is 0.3.
+# A steady drift changes the mean by the width of the band, a vibration with 3/4 period in each quarter by 30 % of it.
 _DRIFT: Final = 0.35
 # A slow vibration swings at least this many times by at least half of its range; a crash swings fewer times.
 _SWINGS: Final = 4
@@ -58,7 +58,7 @@ _ALIKE: Final = 0.75
 _TO_ZERO, _HARDLY = 0.05, 1e-3
 # _FLAT: a body yields in its first oscillation if its energy comes within this share of its later level [-].
 # _MOST_FLAT: longest time for which the energy stays near its minimum, as a share of the time in which it rises [-].
-# For a harmonic motion this share is 0.7; it is larger if bodies of the model collide later in the flight.
+# A harmonic motion stays near its minimum for 0.7 of its rise time, and a body that collides later stays for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
 # Yielding is fed by kinetic energy, so the total energy rises by at most this share of the energy of yielding [-].
 _NOT_FROM_MOTION: Final = 0.1

@@ -25,8 +25,8 @@ _FEWEST: Final = 3
 # A small position error can move a grazing contact, in which surfaces slide along each other, to a much earlier time.
 # _GRAZING_FORCE: a contact grazes the body if its force stays below this share of the largest force on the body [-].
 # _GRAZING_MOMENTUM: a contact also grazes the body if it takes less than this share of the momentum towards it [-].
-# A landing takes more of this momentum: at least 1/4 in theory, and 0.27 in computed landings of cars and boxes.
-# The grazing contact of a computed car took 0.02 of this momentum.
+# A landing takes at least 25 % of the momentum in theory, and took at least 27 % in computed runs of cars and boxes.
+# The grazing contact of a computed car took 2 % of the momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 

@@ -40,7 +40,7 @@ _CONSTANT = 1e-6
 # A momentum, or its change, shows motion only if it exceeds its rounding error by this factor [-].
 _VISIBLE = 100
 # A larger set of parts is preferred only if its window is longer by this factor [-].
-# The factor exceeds 1, because a part with a large momentum, such as a sled, increases the tolerance for all parts.
+# A part with a large momentum, such as a sled, increases the tolerance for all parts and thus the length of windows.
 _LONGER = 1.1
 # _LOOK_BACK: share of the record before td that is searched for attached parts.
 # _LOOK_STATES: largest number of states used for this search.
@@ -297,7 +297,7 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 def _find_attached_parts(
     momenta: Momenta, chosen: Sequence[int], td: float
 ) -> tuple[int, ...]:
-    """Return the attached parts: with them, the deviations of the momenta from straight lines before td cancel.
+    """Return the attached parts, with which the deviations of the momenta from straight lines before td cancel out.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
     the bent momenta, and its projector groups the parts of a body.

@@ -1,4 +1,4 @@
-"""Compute the position error of a body at td that arises because its moving parts were frozen in another position.
+"""Compute the position error of a body at td that arises because moving parts were frozen in another position.
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
@@ -42,13 +42,12 @@ _STATES: Final = 200
 # The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
 _STEADY: Final = 1e-4
 # A position error is a lower bound if the other parts deform by more than this share of the part's motion [-].
-# In computed cars with correct position errors, this share was at most 0.24.
-# In a public car model with position errors that were 3 to 4 times too small, this share was 1.1 to 1.4.
+# In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
+# In a public car model with position errors that were 3 to 4 times too small, the deformation was 1.1 to 1.4 of it.
 _NOTABLE_DOUBT: Final = 1 / 3
 # Position errors below this share of the largest acceptable one are negligible, even if they are underestimated [-].
 _HARDLY: Final = 0.01
-# Largest acceptable position error as a share of the path of the body: 1/3 of the margin before a contact.
-# The margin before a contact is 3 % of the flight.
+# Largest acceptable position error as a share of the path of the body [-]; it is 1/3 of the margin before a contact.
 MOST_OF_PATH: Final = 0.01
 
 

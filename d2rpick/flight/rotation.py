@@ -34,7 +34,7 @@ _ALONG_AXIS: Final = 1e-6
 # Numbers of periods per record that are tried as start values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
-# Number of parts that each of two criteria proposes as the next moving part.
+# Number of parts that each of two criteria selects as candidates for the next moving part.
 _TRIED: Final = 2
 # A part is the next moving part if leaving it out reduces the unexplained displacement to this share or less.
 _MORE_RIGID: Final = 0.5
@@ -268,7 +268,7 @@ class _Apart(NamedTuple):
 def _find_next_moving_part(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
-    """Find the part whose removal makes the others most nearly rigid.
+    """Find the part without which the other parts move most nearly like a rigid body.
 
     If one part slides, all parts may seem to rotate.  Among parts that are equally good, the one with the largest
     effect is chosen.

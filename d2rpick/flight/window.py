@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # First tolerance for a free flight, as a share of the range over the record [-]; a contact exceeds it at once.
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
-# The reduction distinguishes a free flight from other smooth motions, whose windows shrink to less than half.
+# If the tolerance is reduced, windows of other smooth motions shrink to less than half, but not those of flights.
 # _STAYS: a window keeps its length if at least this share of the length remains [-].
 # _STANDS: a window shrinks at one end only if its other end moves by at most this share of the length [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02

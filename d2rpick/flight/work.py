@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 # Smallest number of states from which a load, gravity and damping can be separated, twice the number of unknowns.
 FEWEST_STATES: Final = 6
 # Relative error of the work of gravity, caused by sampling and by the sums of the solver.
-# A contact changes the work by more than this error.
+# A contact changes the work by more than the relative error of the work of gravity.
 _OWN_ERROR: Final = 1e-3
 # Relative deviation of the work of gravity from a parabola that is attributed to damping [-].
 _BENT: Final = 1e-2
 # States whose squared speed is below this share of the largest are not used to compute the mass [-].
 _SLOW: Final = 1e-2
 # Safety factor on the mass that follows from kinetic energy and velocity [-].
-# The factor is needed because a table may contain the kinetic energy of only the chosen parts.
-# It does no harm, because other loads that do work like gravity would need a mass that is much larger.
+# The mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
+# A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
 # Deviations below this share of the range of the internal energy show no work [-].
 _OF_INTERNAL: Final = 0.1
 # Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number [-].
-# The error exceeds 1, because energies, momenta and the mass computed from them are all rounded.
+# Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
 # _LITTLE: losses of kinetic energy below this share are ignored [-].
 # _MUCH: losses of kinetic energy above this share are due to friction, not damping [-].
@@ -90,7 +90,7 @@ def compute_work_beyond_gravity(
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Return an upper bound of the mass by which the integral of F v is multiplied, from the kinetic energy."""
+    """Return an upper bound of the mass, which limits the work of gravity, from kinetic energy and velocity."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     if fast.any():
@@ -403,7 +403,7 @@ def has_visible_contacts(balance: Balance) -> bool:
 
 @remember
 def _make_law_of_contacts(balance: Balance) -> Constant:
-    """Return the law that the contact energy is constant."""
+    """Return the law that the contact energy is constant in free flight."""
     assert balance.sliding is not None
     return Constant(balance.time, balance.sliding[:, np.newaxis])
 

@@ -28,7 +28,7 @@ from d2rpick.models.box_model import (
 )
 
 # Stiffness of floor and curb at one point [N/m], lower than that of the box so that it does not limit the time step.
-# With this stiffness, the weight of the box causes a penetration of 0.5 mm.
+# The weight of the box makes the box penetrate a floor of this stiffness by 0.5 mm.
 STIFFNESS = 5e5
 # Below this sliding speed, friction is proportional to the speed [m/s]. Typical sliding speeds are 100 times as high.
 SLIP = 0.1
@@ -36,9 +36,9 @@ SLIP = 0.1
 DEEPEST = 0.1
 # Thickness of the curb, which is the end of the sled [m].
 CURB_THICKNESS = 0.05
-# No point moves faster than FASTEST times the initial speed, plus FALL, plus twice the speed of the drop.
-# This limit of the speed gives a time in which no point can reach floor, curb or ground.
-# FALL is the speed after a fall of 1 m [m/s].
+# No point moves faster than FASTEST times the initial speed, plus FALL, plus twice the speed of the drop [m/s].
+# The largest speed of a point gives a time in which no point can reach floor, curb or ground.
+# FALL is the speed of a point after a fall of 1 m [m/s].
 FASTEST, FALL = 4.0, 5.0
 # Contact forces that are less than this apart belong to the same contact [s], because corners rattle.
 SAME_CONTACT = 2e-3

@@ -28,7 +28,7 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
 
 
 def describe_expectation(decision: Decision) -> str:
-    """Return the expected error after td, and the worst case if the expectation is wrong."""
+    """Return the expected error after td, and the largest error that is possible."""
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
@@ -82,7 +82,7 @@ def format_with_number(decision: Decision, numbers: Mapping[str, int]) -> str:
 
 
 def list_numbered_reasons(numbers: Mapping[str, int]) -> Lines:
-    """Return the reasons that a table of verdicts refers to, each with its number."""
+    """Return the numbered reasons to which a table of verdicts refers."""
     return [(f"({number})", reason) for reason, number in numbers.items()]
 
 

@@ -372,7 +372,7 @@ def _format_for_screen_reader(offer: Offer) -> str:
 
 
 def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
-    """Describe what an offer gains and loses compared with the offer that is shown first."""
+    """Describe the advantages and disadvantages of an offer compared with the offer that is shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td

@@ -34,7 +34,7 @@ class Kind(NamedTuple):
     def of_part(
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
-        """Return the fields with these ``keys``, or all fields; they read from the object that ``part`` returns."""
+        """Return the fields with these ``keys``, or all fields, to be read from the object that ``part`` returns."""
         return [_read_from_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:

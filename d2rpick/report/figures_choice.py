@@ -533,7 +533,7 @@ def _choose_named_runs(
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
-    """Draw the runs without a name in grey; all these lines together are at most as dark as ten."""
+    """Draw the runs without a name in grey, and the more faintly the more runs there are."""
     named_curves = {id(named_run.curve) for named_run in named_runs}
     other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
     is_thin = len(curves) > _MANY

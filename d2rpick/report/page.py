@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# a page with at least this many sections has a table of contents
+# smallest number of sections with which a page has a table of contents
 _LONG: Final = 4
-# tables with more columns do not fit on a narrow screen
+# largest number of columns of a table that fits on a narrow screen
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
@@ -50,7 +50,7 @@ _MOST_FILES: Final = 20  # largest number of files of a deck that are named
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
-# for each verdict the CSS class of its card and badge
+# CSS class of the card and the badge of each verdict
 CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
-from d2rpick.choice.pair.grades import DO_NOT_USE, USE_WITH_CARE
+from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import format_in_full, format_saved_share
 from d2rpick.report.fields import (
@@ -413,6 +413,15 @@ def _format_place_error(row: PlannedFlight) -> str | None:
     return f"{bound_sign}{best.position_error:.2g}"
 
 
+def _get_verdict(row: PlannedFlight) -> str | None:
+    """Return the verdict on the pair of a flight; None if it may be used but has no window, as in a short flight."""
+    if row.decision is None:
+        return None
+    if row.window is None and row.decision.verdict == USE:
+        return None
+    return row.decision.verdict
+
+
 _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     "": lambda row: "*" if row.status == "supported" else " ",
     "flight": lambda row: row.number,
@@ -427,6 +436,6 @@ _COLUMNS: Final[dict[str, Callable[[PlannedFlight], tables.Cell]]] = {
     ),
     "error": format_pair_error,
     _OUT_OF_PLACE: _format_place_error,
-    "verdict": lambda row: row.decision.verdict if row.decision else None,
+    "verdict": _get_verdict,
     "switch in": lambda row: _RUN[row.status],
 }

@@ -254,7 +254,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest error as text; one number if both are displayed alike."""
+    """Return the smallest and largest error as text, or one number if both are displayed alike."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
@@ -275,7 +275,7 @@ def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _count_verdicts(answer: StudyOfRuns) -> str:
-    """Count for each verdict the runs whose own pair has it."""
+    """Count the runs with each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {format_number_of_runs(counts[word])}"

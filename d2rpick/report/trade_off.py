@@ -139,7 +139,7 @@ def _list_verdict_of_requested(
 
 
 def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
-    """Return what the next better td changes, after the name of the line."""
+    """Return what the next better td changes, as a (name, sentence) pair."""
     return ("other td", _describe_step(trade_off, requested))
 
 
@@ -156,7 +156,7 @@ def _list_choice_if_td_is_free(
 
 
 def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what a smaller error than that of the recommended pair costs, and what a longer rigid time costs."""
+    """Return what an offer with a smaller error costs, and what an offer with a longer rigid time costs, as text."""
     best = trade_off.recommended
     if best is None:
         return []
@@ -256,7 +256,7 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
 
 
 def _explain_why_no_pair(trade_off: TradeOff) -> str:
-    """Explain why no td has a pair, by the example of the td with the highest energy, which could keep most."""
+    """Explain why no td has an acceptable pair, using the td with the highest energy as an example."""
     if not trade_off.offers:
         return "no td in the range has an admissible tr"
     highest = max(trade_off.offers, key=lambda offer: offer.energy_td)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
-# With this time step, a rigid leg costs a few percent of a deformable leg, and its history still shows a contact.
+# With 5 times the time step, a rigid leg costs a few percent of a deformable leg, and still shows a contact.
 _STEP_RATIO: Final = 5.0
 # A flight that is too short to be switched is reported if it lasts for at least this share of the required time [-].
 _REPORTED: Final = 0.5
@@ -309,7 +309,7 @@ class Observer:
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
     ) -> LegFindings:
-        """Return what the histories of joined legs show at the end of the last one.
+        """Return the findings from the joined histories of several legs at the end of the last leg.
 
         ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
         the record shows a longer one, which ``why`` then says.

@@ -298,7 +298,7 @@ class Solver:
         ended = f"ended by signal {self._signal}; " if self._signal else ""
         free = shutil.disk_usage(self.folder).free
         if free < self._measure_largest_restart():
-            # A solver that cannot write prints no error, only what it last wrote.
+            # A solver that cannot write its files prints no error.
             ended += f"the disk is full, {free / 1e6:.3g} MB are free; "
         return ended + (make_printable(text) or "nothing was printed")
 

@@ -128,7 +128,7 @@ class GrowingEvidence:
         written: tuple[Momenta | None, Balance | None],
         is_used: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Append states to the evidence of a set of parts, which begins anew after states that are not used.
+        """Append states to the evidence of a set of parts; after states that cannot be used, the evidence starts again.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
@@ -214,7 +214,7 @@ class GrowingEvidence:
         return None
 
     def find_rigid_times(self) -> list[tuple[float, float, float]]:
-        """Return when rigid bodies had the part momenta: start, the state that shows it, and end [time].
+        """Return the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
 
         The last of these periods may last to the end of the record.
         """

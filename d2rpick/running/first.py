@@ -75,8 +75,8 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
-# _PUSHES: first letters of the LS-DYNA keywords of loads that act without a contact.
-# _OF_GRAVITY: first letters of the LS-DYNA keywords that define gravity.
+# _PUSHES: prefixes of the LS-DYNA keywords of loads that act without a contact.
+# _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 # Gap in LS-DYNA at which the parts become deformable before a contact, as a multiple of the largest shell thickness.
 # The gap must exceed the contact thickness, which is half of the thickness of each of the two shells.

@@ -165,7 +165,7 @@ class _Motion:
         )
 
 
-class Evidence(Protocol):
+class EvidenceOfForces(Protocol):
     """The part of the evidence of a growing record that is needed to follow inner motion."""
 
     # Slices of the latest states, each with the column numbers of the parts that move in it; () without momenta.
@@ -202,7 +202,7 @@ class InnerMotion:
 
     def __init__(
         self,
-        evidence: Evidence,
+        evidence: EvidenceOfForces,
         given: float | None = None,
         of_deck: Wait | None = None,
         before: float = 0.0,

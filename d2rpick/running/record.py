@@ -57,7 +57,7 @@ class RunningMaximum:
         self._last: NDArray[Any] | None = None
 
     def add(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Append values (k, ...) and return the largest so far at each of them."""
+        """Append values (k, ...), and return the largest value so far at each of them."""
         before = values[:0] if self._last is None else self._last
         maxima = np.maximum.accumulate(np.concatenate([before, values]), axis=0)
         self._last = maxima[-1:]

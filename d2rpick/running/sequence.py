@@ -104,7 +104,7 @@ class Order(NamedTuple):
 
 
 class LegFindings(NamedTuple):
-    """What the record up to the end of a leg shows.
+    """The findings from the record up to the end of a leg.
 
     Attributes
     ----------

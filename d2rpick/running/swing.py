@@ -32,7 +32,7 @@ class Swing(NamedTuple):
 
     @property
     def told(self) -> str:
-        """The warning that the user gets before the body becomes rigid."""
+        """The warning that is printed before the body becomes rigid."""
         motion, limit = "still moves relative to the others", "about"
         if self.at_most:
             motion, limit = "moves relative to the other, or both rotate", "at most"

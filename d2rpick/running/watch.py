@@ -31,7 +31,7 @@ _SHARE: Final = 0.01
 # _SHORTEST: shortest pause between two reads [s].
 # _LONGEST: longest pause between two reads that cover only new states [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
-# A run that writes nothing for this time is silent [s].
+# A run is reported as silent if it writes nothing for this time [s].
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
@@ -181,7 +181,7 @@ class Watch:
 
 
 def _expect_contact(lost_events: Sequence[Event], now: float) -> Iterator[Event]:
-    """Report when to expect the first contact among the events that a restart has taken back."""
+    """Yield an event that announces the first contact among the events that a restart has undone."""
     times = [event.time for event in lost_events if event.event == "contact"]
     if times and times[0] is not None and times[0] > now:
         message = "a contact is expected there, as before the restart"
@@ -192,7 +192,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[Event]:  # fmt: skip
-    """Yield the events of a run until it has ended, or for ``lasting`` [s]; other arguments as for `Watch`."""
+    """Yield the events of a run until it has ended, or for ``lasting`` [s]; `Watch` describes the other arguments."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
@@ -219,7 +219,8 @@ def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
         return {}
     files = {}
     for path in (*paths, *find_later_legs(paths)):
-        with suppress(OSError):  # The file may not exist yet, or no longer.
+        # The file may not exist yet, or it may have been removed.
+        with suppress(OSError):
             status = Path(path).stat()
             if status.st_size:
                 files[path] = WatchedFile(

@@ -1,4 +1,4 @@
-"""Find, for each state, the time without force on given parts or the model, from the states up to it.
+"""Find the force-free time of given parts, or of the model, at each state of a record, from the states so far.
 
 In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
 is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Needed = Callable[[float, float], Wait | None]
 
 # A momentum or contact energy is constant if it changes by less than this share of its largest value so far [-].
-# The limit is 10 times the error of sums in single precision.
+# CONSTANT is 10 times the error of sums in single precision.
 CONSTANT: Final = 1e-4
 # Time from one test for a force to the next, as a share of the force-free time so far [-].
 _TEST_AGAIN: Final = 0.25
@@ -41,7 +41,7 @@ _MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """A flight, which is a force-free time that lasted for the required time.
+    """A flight, which is a period without force that lasted for the required time.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class GrowingWitness:
         )
 
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the first state from ``earliest`` on since which no force shows up to ``last``."""
+        """Return the state, not before ``earliest``, from which the states up to ``last`` show no force."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(
@@ -198,7 +198,7 @@ class GrowingWitness:
         self._examined_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
-        """Add a flight since ``first`` that is seen at a state. Without ``gravity``, only set when to test again."""
+        """Add a flight since ``first`` that is seen at a state; if ``gravity`` is None, only schedule the next test."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return
@@ -217,7 +217,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is again as high as at ``first`` [time]; None if before ``last``."""
+        """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
         time_to_level = (

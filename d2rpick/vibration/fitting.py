@@ -235,7 +235,7 @@ def _find_starts(
         alpha = np.concatenate((alpha, 2 * alpha))
     alpha = np.maximum(
         alpha, -1.0
-    )  # The limit keeps exp from overflowing; growth is refused later.
+    )  # The limit prevents an overflow of exp. Growing vibrations are refused later.
     vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
     square = vibration * vibration
     rows = [
@@ -258,8 +258,10 @@ def _find_starts(
     )
     misfit = np.sum((e - (linear[:, None] @ basis)[:, 0]) ** 2, axis=1)
     linear = np.pad(linear, ((0, 0), (0, 6 - linear.shape[1])))
-    phasor = np.sqrt(2 * (linear[:, 1] + 1j * linear[:, 2]))  # (cosine + i sine)**2 / 2
-    mixed = linear[:, 4] + 1j * linear[:, 5]  # 2 preload (cosine + i sine)
+    # The fitted coefficients of the double rate are (cosine + i sine)**2 / 2.
+    phasor = np.sqrt(2 * (linear[:, 1] + 1j * linear[:, 2]))
+    # The fitted coefficients of the single rate are 2 preload (cosine + i sine).
+    mixed = linear[:, 4] + 1j * linear[:, 5]
     preload = (mixed * phasor.conj()).real / (2 * np.abs(phasor) ** 2 + 1e-12)
     plastic = linear[:, 3] - preload**2
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
@@ -320,7 +322,7 @@ def refine_parameters(
 def _build_normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
-    """Return the squared misfit, J J^T and J times the misfit, computed block by block."""
+    """Return the squared misfit, the matrix J J^T of the derivatives J, and J times the misfit, block by block."""
     cost = 0.0
     normal = np.zeros(())
     gradient = np.zeros(())
@@ -337,7 +339,7 @@ def _build_normal_equations(
 def evaluate_energies(
     parameters: Samples, model: Model, s: Samples
 ) -> tuple[Samples, Samples]:
-    """Return energies (n,) and J J^T (p, p) of their derivatives, block by block to save memory."""
+    """Return energies (n,) and the matrix J J^T (p, p) of their derivatives J, block by block to save memory."""
     energy = np.empty(s.size)
     normal = np.zeros(())
     for first in range(0, s.size, BLOCK):
@@ -348,7 +350,7 @@ def evaluate_energies(
 
 
 def compute_covariance(normal: Samples, rest: Samples) -> Samples:
-    """Return s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
+    """Return the covariance matrix s**2 (J J^T)^-1, from the pseudo-inverse of J J^T scaled to a unit diagonal."""
     norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
     scale = norm * norm[:, None]
@@ -363,7 +365,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
     """
 
     def excess(products: Samples) -> float:
-        """Return how far a mean of products exceeds the limit for white noise."""
+        """Return how far the sum of products of neighbouring misfits exceeds the limit for white noise."""
         return abs(float(np.sum(products))) - deviations * float(
             np.linalg.norm(products)
         )

@@ -291,7 +291,7 @@ class _Record(NamedTuple):
         start = float(time[0])
         end = float(time[-1])
         scale = float(np.ptp(energy))
-        # Older numpy versions warn of an overflow when they divide numbers this small, although the result is correct.
+        # When dividing very small numbers, older numpy versions warn of an overflow although the result is correct.
         with np.errstate(over="ignore"):
             scaled = energy / scale
         return cls((time - start) / (end - start), scaled, start, end, scale)
@@ -411,7 +411,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # Mean interval at a random time of the record, so that gaps are weighted by their length.
+    # This is the mean interval weighted by its length, so that gaps count more.
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 

@@ -1,4 +1,4 @@
-"""Compute how uncertain residuals are that follow from spectral lines fitted to a scattered record.
+"""Compute the uncertainty of residuals that follow from spectral lines fitted to a noisy record.
 
 The lines are the least-squares fit of a sum of decaying waves, so the scatter of the record about them gives the
 covariance of their weights and poles, and the gradient of R^2 by these gives the standard deviation of R^2.
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
 _MOST_SHARED: Final = 0.9
 # Assumed standard deviation of the rate of a line before the fit, in cycles over the record.
-# This assumption limits the uncertainty of a line that the fit made from noise.
+# Without an assumed deviation, the uncertainty of a line that the fit made from noise would be unlimited.
 _LOOSE_TURNS: Final = 0.5
 
 

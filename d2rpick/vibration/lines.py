@@ -201,7 +201,7 @@ class Spectrum(NamedTuple):
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
-        """Return the lines of the internal energy that belong to these lines of the kinetic energy.
+        """Convert lines of the kinetic energy to the corresponding lines of the internal energy.
 
         With the damping ratio z and s = sqrt(1 - z^2), the weight of a line of T is -(s + i z)^2 times that of V.
         """
@@ -231,7 +231,7 @@ class Prediction(NamedTuple):
     swing: float
 
     def turned(self) -> Prediction:
-        """Return the prediction of the internal energy that matches this prediction of the kinetic energy."""
+        """Convert a prediction of the kinetic energy to the corresponding prediction of the internal energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
 

@@ -23,7 +23,7 @@ _SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # _SAME_PHASE: largest phase error of a line that is locked because of a static deformation [rad].
 # _SAME_PHASE_OF_HARMONICS: largest phase error of a harmonic [rad].
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# These constants concern the harmonics h1, h2, h3 of the energy of a stiffening spring with q'' + q + e q^3 = 0.
+# h1, h2 and h3 are the heights of the harmonics of the energy of a stiffening spring with q'' + q + e q^3 = 0.
 # _THIRD_OF_SPRING: expected ratio h3 h1 / h2^2 [-], which is 0.42 for a large e and 0.53 for a small e.
 # _THIRD_ROOM: relative tolerance for the third harmonic [-].
 # _HIGHEST_SECOND: largest ratio h2 / h1 [-]; it is at most 0.35 in theory (elliptic cosine).
@@ -38,7 +38,7 @@ _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class StretchLine(NamedTuple):
-    """The ``line`` due to a static deformation, about which the mode of the line ``of_mode`` vibrates.
+    """The ``line`` that arises because the mode of the line ``of_mode`` vibrates about a static deformation.
 
     ``swings`` is True if the stretch swings about its mean; the energy is then the mean of what swings, in two lines.
     ``is_exact`` is False if the rates differ by more than scatter can make them: a solver's structure, or two modes.
@@ -148,7 +148,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def may_be_of_spring(self) -> bool:
-        """Return True if the line may be as high as the third harmonic of a stiffening spring, within the scatter."""
+        """Return True if the line may be as high as the third harmonic of a stiffening spring, except for noise."""
         if self.second > _HIGHEST_SECOND:
             return False
         room = _THIRD_ROOM * self.expected + ABOVE_SCATTER * self.scatter
@@ -156,7 +156,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def is_of_spring(self) -> bool:
-        """Return True if the line is as high as for a stiffening spring, and too high to be scatter."""
+        """Return True if the line is as high as for a stiffening spring, and too high to be noise."""
         is_seen = self.expected > 2 * ABOVE_SCATTER * self.scatter
         return self.may_be_of_spring and is_seen
 
@@ -249,5 +249,5 @@ def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
 
 
 def _wrap(angle: float, turn: float) -> float:
-    """Return an angle between minus and plus half a turn [rad]."""
+    """Return the angle as a value between -pi and pi [rad]."""
     return (angle + turn / 2) % turn - turn / 2

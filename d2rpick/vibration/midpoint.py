@@ -56,7 +56,7 @@ class Reading:
 
     @cached_property
     def _peak_energies(self) -> Samples:
-        """Return the energy h of each mode at the origin [energy]."""
+        """Return the peak energy of each mode at the time origin [energy]."""
         return 2 * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
@@ -80,7 +80,7 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """Return H, the energy of all modes averaged over a period, with the shape of ``t`` [energy]."""
+        """Return the peak energy H of all modes, averaged over a period, with the shape of ``t`` [energy]."""
         if self.no_static:
             level = 2 * self.spectrum.mean.at(t)
         else:
@@ -96,7 +96,7 @@ class Reading:
         """Return how damping changes the vibration energy of each mode within a period; it acts only during motion."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
-        # The weight of each line gives the change as its real part, z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta).
+        # With the damping ratio z, the change at the phase theta is z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta).
         turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 

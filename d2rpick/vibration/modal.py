@@ -81,7 +81,7 @@ _FEWEST_PER_PERIOD: Final = 2.4
 # Number of times per period of the fastest relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Number of parts of the interval between two of these times, in each of which the energy is interpolated linearly.
+# Number of parts into which each interval between such times is divided for linear interpolation of the energy.
 _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that show a flight, relative to the energy range [-].
@@ -99,7 +99,7 @@ _SOME_TIMES: Final = 64
 # Half-width of the error band of R^2 in standard deviations, as for a single oscillator.
 _DEVIATIONS: Final = 2.5
 # Effect on R^2 of the part of the energy that the lines do not explain, as a factor on its share of the energy [-].
-# It combines the energies at tr and, twice, halfway; 1.6 is the 90 % quantile of a normal distribution.
+# R^2 contains the energy at tr once and the energy halfway twice; 1.6 is a 90 % quantile of the normal distribution.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
 # A correlation of neighbouring misfits is treated as noise if it is below this many standard errors.
 _CHANCE: Final = 2.0

@@ -41,7 +41,7 @@ _ZERO = 1e-9
 # "given": the user gave the time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 # Factor on the second differences of the energy, because E'' may be larger between the samples [-].
-# For random vibrations with at least 8 samples per period, this factor covers 99 % of the true crossings.
+# For random vibrations with at least 8 samples per period, a factor of 1.25 covers 99 % of the true crossings.
 _BEND_RESERVE = 1.25
 # Number of standard deviations in the error of a time; 3 cover 99.7 % of normal errors.
 _DEVIATIONS = 3.0
@@ -88,7 +88,7 @@ class SampledEnergy:
         return times[in_question], rising[in_question]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
-        """Return the times from ``since`` to td (k,) at which the energy turns within the tolerance of the level."""
+        """Return the times from ``since`` to td (k,) at which the energy has an extremum near the level."""
         time, energy = self._sampled_before(since)
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
@@ -107,12 +107,12 @@ class SampledEnergy:
         return np.zeros(0)
 
     def reach(self, times: Samples) -> Samples:
-        """Return how far from each time the energy may equal that at td [time]."""
+        """Return the uncertainty of each time at which the energy equals the energy at td [time]."""
         return compute_sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
 class OscillatorEnergy(SampledEnergy):
-    """The ``mode`` of a ``fit`` that describes a record in ``span``, for a ``td`` in the span."""
+    """The ``mode`` of a ``fit`` that describes a record in the window ``span``, for a ``td`` in this window."""
 
     mode: Mode
 
@@ -125,7 +125,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @cached_property
     def sunk(self) -> str | None:
-        """Return a doubt if the vibration at td does not exceed the scatter of the record, else None."""
+        """Return a doubt if the vibration at td does not exceed the noise of the record, else None."""
         start, end = (
             max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
             max(self.td, self.span.start),
@@ -139,9 +139,7 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return (
-                None  # Even if all scatter were in this period, it would be too small.
-            )
+            return None  # Even if all of the misfit were in this period, it would be too small.
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         # Both energies may underflow to 0.
         if vibration > 0 and scatter <= _DROWNED * vibration:
@@ -185,14 +183,14 @@ class OscillatorEnergy(SampledEnergy):
         return sampled[sampled < self.span.start], up[sampled < self.span.start]
 
     def standstills(self) -> Samples:
-        """Return the times in the span before td at which the energy turns, and td itself if it does [time]."""
+        """Return the times in the span up to td at which the energy has an extremum [time]."""
         # The time td itself may be an extremum, which rounding may place before it.
         end = self.td - _ZERO / self.mode.omega
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
 
     def edges(self) -> Samples:
-        """Return standstills and ends of the span, between which the energy is monotone [time]."""
+        """Return the extrema of the energy and the ends of the span, between which the energy is monotone [time]."""
         return np.concatenate(
             [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
         )
@@ -283,7 +281,7 @@ class Moments:
         return self.tr.size
 
     def __getitem__(self, place: int) -> tuple[float, str, bool | None]:
-        """Return tr, kind and direction of one moment; the direction is None if the energy turns there."""
+        """Return tr, kind and direction of one moment; the direction is None at an extremum of the energy."""
         rising = int(self.rising[place])
         return (
             float(self.tr[place]),

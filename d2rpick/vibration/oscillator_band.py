@@ -1,4 +1,4 @@
-"""Compute the error band of an identified oscillator's residual, due to scatter, damping and hidden modes."""
+"""Compute the error band of an identified oscillator's residual, due to noise, damping and hidden modes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Half-width of the error band of R^2 due to scatter, in standard deviations.
+# Half-width of the error band of R^2 due to noise, in standard deviations.
 _DEVIATIONS: Final = 2.5
 # Largest effect on R^2 of a hidden mode that does not change the stated residual, but only its upper bound [-].
 _HARMLESS: Final = 0.25**2
@@ -66,7 +66,7 @@ def residual_band(
 
 
 def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a hidden damped mode that has opposite extremes at tr and td [-]."""
+    """Return R^2 of a hidden damped mode whose deformations at tr and td are opposite extremes [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
 
@@ -86,7 +86,7 @@ def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
 def _compute_deviation(
     fit: Identification, tr: Samples, td: Samples | float
 ) -> Samples:
-    """Return the standard deviation of R^2 of each tr (n,), due to the scatter of the fit's parameters [-].
+    """Return the standard deviation of R^2 of each tr (n,), due to the uncertainty of the fitted parameters [-].
 
     The covariance is scaled to a unit diagonal first: its parameters have different units.
     """

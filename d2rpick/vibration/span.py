@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # _BEGINNINGS: trial windows begin before td by these shares of the time before td [-].
 # _ENDS: trial windows end after td by these shares of the time after td [-].
-# One of these windows fills most of any flight of several periods.
+# One of the trial windows fills most of any flight of several periods.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Further trial windows end before td by these shares of the time before td [-], as td may be in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
@@ -46,7 +46,7 @@ _MUCH_BETTER = 0.7
 # _SHARE_OFF: limit of the mean error as a share of the vibration energy [-].
 # _ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
 # _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
-# _MEANS_PER_PERIOD: number of these means per period.
+# _MEANS_PER_PERIOD: number of mean errors per period.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 # Number of means per energy period that are used to detect a mode in only a part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
@@ -55,7 +55,7 @@ _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
 _MOST_REFITS = 8
 
-# Smallest share of the vibration energy of a hidden mode that is considered [-], which is the error of real solvers.
+# A hidden mode is ignored if it has less than this share of the vibration energy [-], the error of real solvers.
 SMALLEST: Final = 1e-3
 # Largest number of lines in a spectrum, which suffices for 800 periods of the energy.
 _MOST_LINES: Final = 8192
@@ -98,7 +98,7 @@ def find_oscillator(
     whole: bool = False,
     quick: bool = False,
 ) -> tuple[Span | None, Identification]:
-    """Return the window around ``td`` that an oscillator describes, and its fit: given, or else identified.
+    """Return the window around ``td`` that a given or identified oscillator describes, and its fit.
 
     Parameters
     ----------

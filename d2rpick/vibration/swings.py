@@ -38,9 +38,9 @@ _UNEVEN: Final = 0.03
 # In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
 # _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of the hidden share [-].
-# The lower envelope shows only a part of a hidden mode, so this factor is larger than its theoretical value of 2.
+# In theory the factor is 2, but the lower envelope shows only a part of a hidden mode.
 # _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
-# With both numbers, 98.2 % of the residuals below 0.3 in 1,378 records of two modes were in the error band.
+# In 1,378 records of two modes, 98.2 % of the residuals below 0.3 were in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05
 
 
@@ -109,7 +109,7 @@ class Swings(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the residual of each tr (n,), with bounds for any spring and for modes hidden in the envelope.
+        """Return the residual of each tr (n,) and its bounds, due to the unknown spring law and to hidden modes.
 
         A hidden mode is as likely as none, so half of its energy is stated.
         """
@@ -342,5 +342,5 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
 def _is_left_turn(
     a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
-    """Return True if the path through three points turns left at the second."""
+    """Return True if the path through three points bends to the left at the second point."""
     return (b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0])

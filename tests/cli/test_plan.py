@@ -203,6 +203,13 @@ def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
     )
 
 
+def test_a_flight_that_is_too_short_has_no_verdict() -> None:
+    box = "sample_data/rollover_box.matsum"
+    output = run("plan", "-q", "--min-rigid", "5", "--part", "1,2", box).output
+    (row,) = (line for line in output.splitlines() if line.endswith("no run"))
+    assert row.split()[-3:] == ["-", "no", "run"]
+
+
 def test_one_oscillator_is_one_flight() -> None:
     plan_answer = run_json("plan", ENERGY)
     (row,) = plan_answer["windows"]

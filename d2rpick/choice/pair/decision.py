@@ -211,7 +211,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
     """Explain why a pair is good: its vibration is preserved, or the error of the vibration hardly matters."""
     if quality.alone.grade == GOOD:
-        error = "" if residual is None else f": it is wrong by {residual:.1%}"
+        error = "" if residual is None else f" to within {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 
@@ -221,11 +221,11 @@ def _explain_raised_grade(quality: Quality) -> str:
     if quality.worth is None or quality.alone.grade == quality.vibration.grade:
         return ""
     share = quality.worth.share
-    return f", but that is at most {share:.2%} of the energy of the next contact"
+    return f", but the energy of this error is at most {share:.2%} of the energy of the next contact"
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Format the bounds of the mean energy; as one number if both are displayed alike."""
+    """Format the bounds of the mean energy, as one number if both are displayed alike."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 

@@ -477,7 +477,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
     high = best.residual_high or best.residual
     causes = []
     if best.residual > MOST_GOOD:
-        worst_text = f", or by up to {high:.0%}" if high > _MOST_HIDDEN else ""
+        worst_text = f", or {high:.0%} at worst" if high > _MOST_HIDDEN else ""
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",

@@ -170,7 +170,7 @@ class Situation:
         share = self.vibration.kinetic_share
         if share is None or self.at_rest:
             return None
-        return share  # The share is NaN if it is undefined for lack of a vibration.
+        return share  # The kinetic fraction is NaN if nothing vibrates.
 
     @property
     def earliest_tr(self) -> float | None:
@@ -411,7 +411,7 @@ def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
-    """Return True if a window is so long that no modes are searched for that describe more of the record."""
+    """Return True if a window covers so much of the record that no modes need to be searched for."""
     if described is None:
         return False
     record = float(history.time[-1] - history.time[0])

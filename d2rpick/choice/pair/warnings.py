@@ -46,8 +46,8 @@ POOR_RESIDUAL = 0.5
 _NOTABLE_PLASTIC = 0.05
 
 # Assumed static energy as a share of the lowest energy in flight [-], as many modes are never all at zero deformation.
-# With this share, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
-# For a shell box, the errors of the mean energies were -0.05 to 0.16 with this share.
+# With _AT_REST = 0.85, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
+# With _AT_REST = 0.85, the predicted mean energies of a shell box had errors of -0.05 to 0.16.
 _AT_REST = 0.85
 # Largest mean energy after td relative to the reference run [-], which may exceed 1 because the estimate is inexact.
 # Switching adds no energy, so a larger ratio shows that there is a contact in the flight.
@@ -189,7 +189,7 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if nothing shows how the body turns and its rotation may make the next contact earlier."""
+    """Yield a warning if the rotation of the body is unknown and may make the next contact earlier."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.rotation is None:
@@ -644,7 +644,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """Describe the ratio by which the mean energy after td would exceed that of the reference run."""
+    """Describe by which factor the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-    # A test of times, which returns True for each time that passes.
+    # Function that tests times, and returns True for each time that passes the test.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of bisections that locate the end of a window, to 1e-6 of the sampling interval.
+# Number of bisections that locate the end of a window with an accuracy of 1e-6 of the sampling interval.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
@@ -292,7 +292,7 @@ def _is_inside(times: Samples, windows: Samples) -> Samples:
 
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Thin out a curve: keep the ends of the windows, and in each gap add the point farthest from the straight line."""
+    """Thin out a curve by keeping the ends of windows and, between them, the points farthest from straight lines."""
     points = np.flatnonzero(np.isin(times, windows))
     while True:
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))

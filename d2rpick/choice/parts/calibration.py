@@ -422,7 +422,7 @@ def _add_counts(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add the number of elements of known cost, multiplied by ``times``, to the counts by class."""
+    """Add the numbers of elements of known cost, multiplied by the factor ``times``, to the counts by class."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

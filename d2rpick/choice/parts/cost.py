@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import SourceFile
 
 # Cost of an element per cycle [us]; a shell costs "point" more for each integration point after the first.
-# These costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
+# The costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
 # The costs of beams and springs are less accurate than the other costs.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {

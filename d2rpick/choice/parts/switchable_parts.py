@@ -267,7 +267,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part. Mass and time step from the deck (``by_deck``) are used without better values."""
+    """Collect the data of a part; ``by_deck`` are its mass and its time step according to the deck."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -327,7 +327,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with verdict and reasons; ``alone`` is the part that takes the landing alone."""
+    """Return the row of a part with verdict and reasons; ``alone`` is the part that absorbs the landing alone."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(

@@ -1,1 +1,1 @@
-"""Ask one question of many runs, and find one tr for all of them."""
+"""Answer one question for many runs, and find one tr for all of them."""

@@ -1,4 +1,4 @@
-"""Ask one question for many runs: the tr of each, their agreement, one tr for all, and outliers."""
+"""Answer one question for many runs: the tr of each run, their agreement, one tr for all runs, and outliers."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """The question that every run is asked: ``td`` is a time, a window for td, or None for the longest flight.
+    """The question that is answered for every run; ``td`` is a time, a window for td, or None for the longest flight.
 
     With ``curve`` an outline of the energy is kept for drawing.
     """
@@ -138,7 +138,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs, with the window that all share [time]; None with the reason if there is no such tr.
+    """One tr for all judged runs, with the window that all runs share [time]; None, with the reason, if there is none.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
@@ -182,7 +182,7 @@ class StudyOfRuns:
 
     @property
     def energy_unit(self) -> str:
-        """Unit of the energies; empty if the judged runs do not name the same one."""
+        """Unit of the energies; empty if the judged runs name different units."""
         units = {row.energy_unit for row in self.runs if row.judged}
         return units.pop() if len(units) == 1 else ""
 
@@ -320,7 +320,7 @@ def stamp_files(source: str) -> tuple[Stamp, ...]:
 def compare_rows(
     td: float | tuple[float, float] | None, rows: Sequence[StudyRow]
 ) -> StudyOfRuns:
-    """Compare the rows of a study; ``td`` is the requested td or window for it."""
+    """Compare the rows of a study; ``td`` is the requested td, or the requested window for td."""
     times, low, high = _find_common_interval(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None

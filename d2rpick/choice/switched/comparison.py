@@ -30,11 +30,10 @@ MOST_MOMENTUM_ERROR = 0.05
 # Deviations are divided by at least this share of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
 # A note is issued if the energy reported while rigid differs from the energy at td by more than this share [-].
-# The reason for the note is that some solvers report a wrong energy for rigid solid elements.
+# Such energies differ because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
 # _STILL: an energy is constant if it changes by less than this share of the energy [-].
-# _STILL_OF_VIBRATION: the change must also be less than this share of the vibration energy [-].
-# The second limit is needed because the vibration energy may be small compared with plastic work.
+# _STILL_OF_VIBRATION: a constant energy also changes by less than this share of the vibration energy [-].
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05

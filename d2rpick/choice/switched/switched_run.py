@@ -346,7 +346,7 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or all parts ``among`` others, that have internal energy."""
+    """Return the chosen parts, or else all parts, that have internal energy; only parts ``among`` the given, if any."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()

@@ -42,9 +42,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 # A window is left out if a later window is longer by more than this factor [-].
-# The factor follows from the rigid time in the next two runs, with a window of length w and a later one of length W.
-# If both windows are used, the first run is rigid for w and the second run is rigid for w + W.
-# If only the later window is used, both runs are rigid for W, which is more in total if W > 2 w.
+# If a window of length w and a later window of length W are used, two successive runs are rigid for w and w + W.
+# If only the later window of length W is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
 
 
@@ -427,7 +426,7 @@ def _warn_about_windows(
         for caution in row.answer.cautions if row.answer else ():
             if (
                 caution.code == WRONG_ENERGY
-            ):  # this warning concerns the whole run, not a flight
+            ):  # The warning concerns the whole run, not a single flight.
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)

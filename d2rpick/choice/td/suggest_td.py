@@ -53,7 +53,7 @@ _READ: Final = 3
 # A pair is mentioned if it is rigid for longer than the recommended one, by at least this share of the td range [-].
 _MUCH: Final = 0.1
 # Safety factor on the uncertainty of the contact time that is estimated from the energy [-].
-# The factor is needed because modes can vibrate without changing the energy; 20 computed falls needed up to 1.9.
+# In 20 computed falls, the estimate of the uncertainty was too small by a factor of up to 1.9.
 _HIDDEN: Final = 2.0
 
 

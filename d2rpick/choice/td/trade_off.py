@@ -1,4 +1,4 @@
-"""Show what each td offers: the error and the rigid time of the best tr, for a grid of td and the energy peaks."""
+"""Find the error and the rigid time of the best tr for each td of a grid, and for the energy peaks."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def explore_run(
     steps: int = STEPS,
     since: float | None = None,
 ) -> TradeOff:
-    """Find what each td in a window offers.
+    """Find the best pair for each of many td in a window.
 
     Parameters
     ----------
