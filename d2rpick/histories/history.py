@@ -271,7 +271,7 @@ class History:
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly. Anything else
     raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
-    energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
+    energy; ``parts`` are the parts whose energy it is, or None for the whole model; ``springs`` are those of them whose
     energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
     ends within a state; ``notes`` are for the user; ``files`` were read. ``time_unit`` and
     ``energy_unit`` are empty unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a
@@ -389,7 +389,7 @@ class History:
         return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
 
     def check(self, *times: float, argument: str = "") -> None:
-        """Raise RangeError unless all times of an ``argument`` are in the record."""
+        """Raise RangeError if a time given for ``argument`` lies outside the record."""
         low = self.time[0]
         high = self.time[-1]
         if all(low <= time <= high for time in times):
