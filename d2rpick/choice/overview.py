@@ -84,7 +84,7 @@ class Overview(NamedTuple):
     ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
     is that of the run, with the longest flight as its window; None without energies.  ``unjudged`` states why no times
     can be chosen from the run; empty if they can.  ``should_write`` names the output that would show the flights for
-    certain; None if it is written, or there is no state.
+    certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run that was used.
     """
 
     source: tuple[str, ...]
@@ -106,6 +106,7 @@ class Overview(NamedTuple):
     alarms: tuple[Caution, ...] = ()
     unjudged: tuple[Caution, ...] = ()
     contact_forces: tuple[ForceOverview, ...] = ()
+    deck: str | None = None
 
     @property
     def verdict(self) -> str:
@@ -216,6 +217,7 @@ def describe_run(
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
+        deck=deck,
     )
 
 

@@ -139,7 +139,9 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
         which = ["--part", "flying"]
     else:
         which = ["--part", "all"] if overview.parts else []
-    command = ["d2rpick", "plan", *which, *tables.make_positional(overview.source)]
+    deck = ["--deck", overview.deck] if overview.deck else []
+    command = ["d2rpick", "plan", *which, *deck]
+    command += tables.make_positional(overview.source)
     return [*lines, ("next", tables.quote_shell_line(command))]
 
 
