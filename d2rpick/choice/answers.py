@@ -140,9 +140,9 @@ class PairVerdict(AnswerAtTd):
         return is_same_tr and good.td == self.situation.td
 
     @property
-    def quality(self) -> Quality | None:
-        """Grade of the pair; None if it is not admissible."""
-        return self.decision.quality if self.admissible else None
+    def quality(self) -> Quality:
+        """Grades of the motion and of the vibration of the pair."""
+        return self.decision.quality
 
     @cached_property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:

@@ -136,7 +136,11 @@ CANDIDATE: Final = row(
     Field("timing_tolerance", "size?"),
     Field("tr_low", "number?"),
     Field("tr_high", "number?"),
-    Field("acceptable", "flag"),
+    Field(
+        "acceptable",
+        "flag",
+        "true if tr is admissible, and the residual is at most 0.5 or unknown",
+    ),
     Field("recommended", "flag"),
     Field("notes", "texts"),
     Field(

@@ -86,11 +86,13 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if the verdict is clear. Otherwise choose a td near a peak of the internal energy.",
         ),
         "no-better-td": Explanation(
-            "No peak of the energy in this flight has an admissible tr, so d2rpick offers no other td.",
+            "No peak of the energy in this flight has an admissible tr: a tr in the flight, with the same direction as "
+            "at td and a small enough error. So d2rpick offers no other td.",
             "Compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "no-candidate": Explanation(
-            "No tr is admissible for this td. The warning gives the reason for the nearest candidate.",
+            "No tr is admissible for this td: each lies outside the flight, has the opposite direction, or has too "
+            "large an error. The warning gives the reason for the nearest candidate.",
             "Omit --td, compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "no-energy": Explanation(

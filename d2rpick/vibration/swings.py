@@ -33,7 +33,11 @@ _MOST_OFF: Final = 0.1
 # Smallest number of minima that define a lower envelope.
 _FEWEST: Final = 5
 # In a beat, neighbouring half cycles differ in length by at least this share [-].
-_UNEVEN: Final = 0.03
+# The difference is about half of the energy share of the other mode, so this is a share of 0.02.
+_UNEVEN: Final = 0.009
+# _MOST_BEATING: more than this share of the half cycles alternates if two modes beat [-].
+# _STRETCHED: relative difference in length over that in height in a beat; a preload gives 0.3 [-].
+_MOST_BEATING, _STRETCHED = 0.75, 1.3
 # Factor by which the residual may be larger or smaller because the spring law is unknown [-].
 # In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
@@ -196,10 +200,11 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
 
 
 def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
-    """Return True if half cycles alternate as in the beat of two modes with rates 2 to 3 or 2 to 7.
+    """Return True if half cycles alternate as in the beat of two modes with rates 2 to 3, 2 to 5 or 2 to 7.
 
     The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
-    preload and goes farther there; in a beat the longer swing is the lower one.
+    preload and goes farther there, by equal shares.  In a beat the longer swing is the lower one, or the swings differ
+    much more in length than in height.
 
     Parameters
     ----------
@@ -211,11 +216,16 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
     middle = (bottom[1:] + bottom[:-1]) / 2
     lasting = np.diff(bottom)
     height = np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
-    longer = np.diff(lasting)
-    higher = np.diff(height)
-    uneven = np.abs(longer) > _UNEVEN * (lasting[1:] + lasting[:-1])
-    opposed = uneven & (longer * higher < 0)
-    return bool(2 * np.count_nonzero(opposed) > opposed.size)
+    longer = np.diff(lasting) / (lasting[1:] + lasting[:-1])
+    higher = np.diff(height) / (height[1:] + height[:-1])
+    # The first and the last difference have only one neighbour.
+    neighbours = np.stack([longer[:-2], longer[2:]])
+    longer, higher = longer[1:-1], higher[1:-1]
+    alternating = (np.abs(longer) > _UNEVEN) & np.all(longer * neighbours < 0, axis=0)
+    opposed = longer * higher < 0
+    stretched = np.abs(longer) > _STRETCHED * np.abs(higher)
+    beating = alternating & (opposed | stretched)
+    return bool(np.count_nonzero(beating) > _MOST_BEATING * beating.size)
 
 
 def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:

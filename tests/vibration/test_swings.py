@@ -58,6 +58,7 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(
 
 
 @example(1.5, 2.375, 1.0)  # every minimum of these beats lies on one level
+@example(1.5, 2.375, 0.0625)
 @example(3.503, 2.404, 0.199)
 @example(3.498, 2.347, 0.125)
 @example(3.509, 2.151, 0.036)

@@ -13,7 +13,11 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import compare_error_with_contact
 from d2rpick.choice.pair.candidates import Candidates, judge_candidates
 from d2rpick.choice.pair.grades import FAIR, GOOD, GRADES, POOR
-from d2rpick.choice.pair.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
+from d2rpick.choice.pair.warnings import (
+    POOR_KINETIC_SHARE,
+    POOR_RESIDUAL,
+    list_times_outside_flight,
+)
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
@@ -57,6 +61,7 @@ _ENOUGH_STATES: Final = 200
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
+_CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 
 
@@ -328,7 +333,11 @@ def grade_pair(situation: Situation, best: Candidate) -> Quality:
     """Grade the recommended tr of a td: its motion, and its vibration, also in comparison with the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
-    ruined = [Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined]
+    outside = list_times_outside_flight(situation, best.tr)
+    ruined = [
+        *(Cause(fault, _CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
+        *(Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined),
+    ]
     if flight.unknown_load:
         ruined.append(_UNKNOWN_LOAD)
     motion = Grade.of(ruined, uncertain)

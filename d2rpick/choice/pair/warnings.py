@@ -569,6 +569,16 @@ def _get_first_tr(situation: Situation) -> float:
     return round_to_first_as_read(situation.earliest_tr)
 
 
+def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
+    """Return which of the times of a pair lie outside the flight, or less than the margin before its end."""
+    outside = []
+    if tr < _get_first_tr(situation):
+        outside.append(f"tr {_describe_in_load(situation)}")
+    if situation.td > situation.latest_td:
+        outside.append(f"td after {describe_end_of_flight(situation)}")
+    return outside
+
+
 def _tell_in_load(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
