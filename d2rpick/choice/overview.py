@@ -32,6 +32,7 @@ from d2rpick.choice.switched.switched_run import (
     select_model_momenta,
 )
 from d2rpick.choice.td.flights import find_flights
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import read_balance
@@ -183,6 +184,7 @@ def describe_run(
         flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
+        flaws += tuple(_warn_about_flights_outside(history, flights))
     else:
         flaws = tuple(_warn_about_missing_energy(run, selection))
     channels = dict.fromkeys(chain.from_iterable(d.channels for d in run.databases))
@@ -395,6 +397,21 @@ def _warn_about_missing_energy(
         run.history(selection)
     except FormatError as error:
         yield Caution("no-energy", str(error))
+
+
+def _warn_about_flights_outside(
+    history: History, flights: Sequence[tuple[str, FreeFlight]]
+) -> Iterator[Caution]:
+    """Yield a warning for each flight that the energies do not reach, as in files of different runs."""
+    for _, flight in flights:
+        last_td = flight.end - LEAST_MARGIN * (flight.end - flight.start)
+        if flight.end_seen and last_td > history.end:
+            span = f"from {flight.start:.6g} to {flight.end:.6g}"
+            text = f"the flight {span} reaches outside the record of the energy, which ends at {history.end:.6g}"
+            yield Caution(
+                "flight-outside-record",
+                f"{text}; do all files belong to the same run?",
+            )
 
 
 def _find_flights_to_choose_from(

@@ -386,7 +386,9 @@ class History:
         legs = find_later_legs(self.source)
         if not legs:
             return ""
-        return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
+        if len(legs) == 1:
+            return f"; in the same folder is {legs[0]}, a later restart segment of the run? Name it too"
+        return f"; in the same folder are {', '.join(legs)}, later restart segments of the run? Name them too"
 
     def check(self, *times: float, argument: str = "", subject: str = "") -> None:
         """Raise RangeError unless all times are in the record.

@@ -180,7 +180,7 @@ def _judge_better_pair(answer: PairSuggestion, better: Pair) -> str:
     if decision is None:
         return f"{_format_times(better)}: {describe_improvement(answer, better)}"
     if decision.verdict == DO_NOT_USE:
-        return f"{_format_times(better)}: {DO_NOT_USE} it either, because {decision.reason}"
+        return f"{_format_times(better)}: {DO_NOT_USE} it, because {decision.reason}"
     return f"{_format_times(better)}: {decision.verdict}; {describe_improvement(answer, better)}"
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
 from tests.command import BOX, ENERGY, MATSUM, ROOT, join_wrapped_lines, run, run_json
 
 SAMPLES = ROOT / "sample_data"
@@ -48,6 +49,14 @@ def test_the_step_after_info_keeps_the_deck() -> None:
     assert f"--deck {DECK}" in find_line("next", "info", "--deck", DECK, MATSUM)
 
 
+def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
+    result = run("info", MATSUM, ENERGY)
+    text = join_wrapped_lines(result.stdout)
+    assert text.startswith("verdict do not use why the flight from 0.086 to 0.379")
+    assert "do all files belong to the same run?" in text
+    assert "next" not in text.split("source")[0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "cause"),
     [
@@ -57,6 +66,7 @@ def test_the_step_after_info_keeps_the_deck() -> None:
             ("suggest", MATSUM, ENERGY),
             "the longest flight, 0.086 0.379 reaches outside",
         ),
+        (("plan", MATSUM, ENERGY), "flight 1, 0.086 "),
         (
             ("explore", MATSUM, ENERGY),
             "the longest flight, 0.086 0.379 reaches outside",
@@ -113,3 +123,13 @@ def test_a_complete_run_is_not_called_cut_because_another_is_longer() -> None:
     assert "ends early, at 0.42" in join_wrapped_lines(result.stdout)
     assert "cut at" not in result.stdout
     assert ";\n" not in result.stdout
+
+
+def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
+    cause = Cause(
+        "unknown", "write more often, or compare with a finished switched run"
+    )
+    grade = Grade("poor", (cause,))
+    quality = omit_comparison(Quality(grade, grade, grade))
+    cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
+    assert cures == {"write more often"}
