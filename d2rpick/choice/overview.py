@@ -85,7 +85,8 @@ class Overview(NamedTuple):
     ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
     is that of the run, with the longest flight as its window; None without energies.  ``unjudged`` states why no times
     can be chosen from the run; empty if they can.  ``should_write`` names the output that would show the flights for
-    certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run that was used.
+    certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run that was used,
+    and ``selection`` the columns and parts that the user chose.
     """
 
     source: tuple[str, ...]
@@ -108,6 +109,7 @@ class Overview(NamedTuple):
     unjudged: tuple[Caution, ...] = ()
     contact_forces: tuple[ForceOverview, ...] = ()
     deck: str | None = None
+    selection: Selection = Selection()
 
     @property
     def verdict(self) -> str:
@@ -220,6 +222,7 @@ def describe_run(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
         deck=deck,
+        selection=selection,
     )
 
 

@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
-from tests.command import BOX, ENERGY, MATSUM, ROOT, join_wrapped_lines, run, run_json
+from tests.command import (
+    BOX,
+    ENERGY,
+    MATSUM,
+    ROLLOVER,
+    ROOT,
+    join_wrapped_lines,
+    run,
+    run_json,
+)
 
 SAMPLES = ROOT / "sample_data"
 DECK = str(SAMPLES / "rollover_box.k")
@@ -47,6 +56,14 @@ def test_after_the_deck_is_written_the_next_step_is_to_run_it(tmp_path: Path) ->
 
 def test_the_step_after_info_keeps_the_deck() -> None:
     assert f"--deck {DECK}" in find_line("next", "info", "--deck", DECK, MATSUM)
+
+
+def test_the_step_after_info_keeps_the_selected_energy() -> None:
+    text = find_line("next", "info", "--energy", "boxIE_J", ROLLOVER)
+    assert text == f"d2rpick plan --energy boxIE_J {ROLLOVER}"
+    step = run(*shlex.split(text)[1:])
+    assert step.exit_code in (0, 1)
+    assert "flight" in step.stdout
 
 
 def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
