@@ -41,10 +41,10 @@ class Answer:
 
         @property
         def command(self) -> tuple[str, ...]:
-            """The command line that gives the same answer, without the name of the program."""
+            """The command line that gives the same answer; it begins with the name of the command."""
 
     cautions: tuple[Caution, ...]
-    kind: ClassVar[str]  # name of the answer in the table of output forms
+    kind: ClassVar[str]  # Name of the answer in the table of output forms.
     # Names of the attributes that the short form of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
 
@@ -143,7 +143,7 @@ class RunAnswer(Paged):
 
     question: RunQuestion = field(repr=False)
     times: tuple[str, ...]
-    name: ClassVar[str]  # name of the command that asks the question
+    name: ClassVar[str]  # Name of the command that asks the question.
 
     @property
     def run(self) -> Run:
@@ -152,7 +152,7 @@ class RunAnswer(Paged):
 
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that gives the same answer, without the name of the program."""
+        """The command line that gives the same answer; it begins with the name of the command."""
         return (self.name, *self.times, *self.question.options)
 
     @classmethod

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
-    # False means no deck, even if there is one in the folder of the run.
+    # False means no deck, even if the folder of the run contains a deck.
     Deck = Path | Literal[False]
     Parts = str | int | Iterable[str | int]
     # A number in the unit of the run, or a string with a unit, such as 64ms.
     Time = float | str
 
-# largest number of characters of a wrong value that a message shows
+# A message shows at most this number of characters of a wrong value.
 _LONGEST_SHOWN: Final = 60
 
 
@@ -177,7 +177,7 @@ def suggest_without_percent(value: object, *, is_time: bool) -> str:
 def check_optional_number(
     name: str, value: object, limits: Number = TIME
 ) -> float | None:
-    """Return a finite number within its limits, or None if none is given."""
+    """Return a finite number within its limits, or None if no number is given."""
     return None if value is None else check_number(name, value, limits)
 
 

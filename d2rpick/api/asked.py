@@ -49,7 +49,8 @@ class RunQuestion(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    of_this_run: bool = True  # False if the deck was found to belong to another run.
+    # The value is False if the deck was found to belong to another run.
+    of_this_run: bool = True
 
     @property
     def deck(self) -> str | None:
@@ -209,7 +210,7 @@ def read_cost_model(request: Request) -> CostModel | None:
 def complete_selection(
     run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection of parts: add the recommended set, and the springs of the deck that have energies.
+    """Complete a selection of parts with the recommended set, and with the springs of the deck that have energies.
 
     Raises
     ------

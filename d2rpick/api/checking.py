@@ -1,4 +1,4 @@
-"""Check decks by the rules and, with a history, by the verdict on their windows."""
+"""Check decks by the rules and, if there is a history, by the verdicts on their windows."""
 
 from __future__ import annotations
 

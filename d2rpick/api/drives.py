@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Shortest time between td and the next contact [s].
 _SHORTEST = 2e-3
-# Assumed cost of a cycle with rigid parts relative to a cycle without, if the deck does not determine it.
+# Assumed cost of a cycle with rigid parts, relative to a deformable cycle, if the deck does not determine it [-].
 _UNKNOWN = 0.5
 
 

@@ -44,8 +44,9 @@ PARAMETERS = (
     "tilt",
     "ground_stiffness",
 )
-TD = 0.37  # default td, which is 10 ms before the ground contact of the published study [s]
-# tilt of a falling box, with which it lands on an edge and tumbles [degrees]
+# Default td, which is 10 ms before the ground contact of the published study [s].
+TD = 0.37
+# Tilt of a falling box, with which it lands on an edge and tumbles [degrees].
 TILT = 30.0
 # End time of the simulation [s]; the key is True for a dropped box.
 T_END = {False: 0.42, True: 1.2}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times
 
-_STEPS: Final = 200  # default number of td values to explore
+_STEPS: Final = 200  # Default number of td values to explore.
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -134,8 +134,9 @@ class Request(ChoiceOptions, ReadingOptions):
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    run_folder: str | None = None  # folder of the run whose files `history` names
-    deck_in_folder: bool = False  # True if `deck` was found in the folder of the run
+    run_folder: str | None = None  # Folder of the run whose files `history` names.
+    # The value is True if `deck` was found in the folder of the run.
+    deck_in_folder: bool = False
     given: Collection[str] | None = None
 
     def __post_init__(self) -> None:
@@ -228,7 +229,7 @@ class Request(ChoiceOptions, ReadingOptions):
             from d2rpick.vibration.oscillator import to_mode
 
             mode = to_mode(oscillator, self.v0)
-        # Options without a value keep the defaults of the settings.
+        # Options that have no value keep the defaults of the settings.
         chosen = {
             name: getattr(self, name)
             for name in _USES
@@ -306,7 +307,7 @@ def _write_word(value: Any) -> str:
 
 
 def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
-    """Read ``QUANTITY=NAME``; raise ArgumentError for an unknown quantity, or one that is given twice."""
+    """Read ``QUANTITY=NAME``; raise ArgumentError if the quantity is unknown or given twice."""
     from d2rpick.histories.names import QUANTITIES, suggest_name
 
     split = (text.partition("=") for text in texts)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # beginning of the summary line below the rows
+_LAST: Final = b'{"schema": '  # Beginning of the summary line below the rows.
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -329,7 +329,7 @@ class Ledger:
             )
 
     def find(self, source: str) -> StudyRow | None:
-        """Return the stored row of a run whose files are unchanged; None if there is none."""
+        """Return the stored row of a run whose files are unchanged; None if no such row is stored."""
         files = stamp_files(source)
         row = self._rows.get(files)
         if row:

@@ -1,4 +1,4 @@
-"""Convert tables of other libraries to frames of pandas, without importing these libraries."""
+"""Convert tables of other libraries to frames of pandas; these libraries are not imported."""
 
 from __future__ import annotations
 

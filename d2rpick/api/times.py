@@ -158,7 +158,7 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the only unit; empty if there is none, or several."""
+    """Return the only unit; empty if there is no unit, or if there are several."""
     return next(iter(units)) if len(units) == 1 else ""
 
 

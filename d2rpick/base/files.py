@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
 
-STDIN: Final = "-"  # file name that stands for standard input
+STDIN: Final = "-"  # File name that stands for standard input.
 # Limits on the content of a file, each with its default value and its unit.
 _BOUNDS: Final = {
     "RATIO": (
@@ -38,8 +38,8 @@ _BOUNDS: Final = {
 # Smallest unpacked size for which the ratio is checked [bytes]; constant columns reach a ratio of 1000.
 _ALLOWED: Final = 1 << 24
 _TRIES: Final = 5  # number of attempts to read a file that keeps changing
-_TICK: Final = 50_000_000  # resolution of most file times [ns]
-# resolution of file times on file systems that store whole seconds [ns]
+_TICK: Final = 50_000_000  # Resolution of most file times [ns].
+# Resolution of file times on file systems that store seconds without fractions [ns].
 _COARSE: Final = 2_000_000_000
 # Longest time to write a byte [ns]. A system may set the file time when the last write begins.
 _SLOWEST: Final = 5
@@ -49,7 +49,7 @@ _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """Bytes that can be searched backward."""
+    """Bytes in which the last occurrence of a mark can be found."""
 
     def __len__(self) -> int: ...
 
@@ -94,7 +94,7 @@ def describe_unpacked_excess(packed: int, unpacked: int) -> str:
 
 
 def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
-    r"""Return the offset of a line that exceeds the limit, or -1; only a part of the data is searched.
+    r"""Return the offset of a line that exceeds the limit, or -1; only a part of the data is examined.
 
     ``most`` is the bound, if it is known already.
 
@@ -152,7 +152,7 @@ class FileState(NamedTuple):
         )
 
     def is_as(self, earlier: FileState) -> bool:
-        """Return True if this is the same file without a visible change."""
+        """Return True if this is the same file and no change of it is visible."""
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
-_OF_REPOSITORIES: Final = (".git", ".hg")  # folders that mark the root of a repository
+_OF_REPOSITORIES: Final = (".git", ".hg")  # Folders that mark the root of a repository.
 # Settings of the deck check; the search covers the folder of each deck and the folders above it.
 RULE_KEYS: Final = ("select", "ignore", "severity")
 # Quotes and blanks that may surround the parts of a dotted key.
@@ -179,7 +179,7 @@ def _may_have_settings(text: str) -> bool:
 
 
 def _read_table(path: str, *, shared: bool) -> object:
-    """Read the settings of a TOML file; None if a file that is ``shared`` with other tools has none."""
+    """Read the settings of a TOML file; None if a file that is ``shared`` with other tools has no settings."""
     try:
         # utf-8-sig: editors on Windows begin a text with a byte order mark
         with open(path, encoding="utf-8-sig") as file:

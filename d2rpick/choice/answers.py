@@ -364,7 +364,7 @@ class PairSuggestion(AnswerAtTd):
 
 
 def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
-    """Return the verdict on the recommended pair; if it is not good, with the better pair, which needs a search."""
+    """Return the verdict on the recommended pair, with a better pair from a search if the pair is not good."""
     decision = answer.decision
     if decision is None or decision.reaches(GOOD) or answer.better_pair:
         return decision
@@ -414,7 +414,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
     start = situation.earliest_tr
     if start is None:
         return None
-    # if the end of the flight is unknown, do not search after td
+    # If the end of the flight is unknown, no td after the given td is tried.
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -471,7 +471,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td in the same way as at a td that the user gives."""
-    # The oscillator is fitted again, but the time-consuming search for the reason why there is none is omitted.
+    # The oscillator is fitted again, but the slow search for the reason of a refusal is omitted.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 

@@ -54,8 +54,8 @@ _UNRELIABLE: Final = "do not rely on the internal energy"
 # A run has diverged if it meets the following three criteria within the share _WITHIN of the record.
 # _GAIN: the kinetic energy exceeds all earlier energies by this factor [-].
 # _SPEED: the kinetic energy exceeds the internal energy by this factor [-].
-# _TORN: the internal energy grows by this factor [-].
-# Sound runs do not meet them, because a load that accelerates a body also deforms it.
+# _TORN: the internal energy grows by this factor as elements are torn [-].
+# Sound runs do not meet these criteria, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
 # Smallest number of earlier states with energy for recognising a diverged run; the first states may be round-off.
@@ -159,7 +159,8 @@ def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caut
 
 def warn_about_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Yield a warning if listings in the folder of a run show an engine version that reports wrong energies."""
-    if not any("T0" in name for name in sources):  # no listing of a Radioss engine
+    # The run has no listing of a Radioss engine.
+    if not any("T0" in name for name in sources):
         return
     # Imported here to keep start-up fast.
     from d2rpick.histories.listings import (
@@ -242,7 +243,7 @@ def _compute_share(energy: Samples | None, peak: float | None) -> float | None:
 
 
 def _subtract_friction(balance: Balance) -> Samples | None:
-    """Return the contact energy minus its frictional part, if that is known."""
+    """Return the contact energy, minus its frictional part if that part is known [energy]."""
     if balance.sliding is None or balance.friction is None:
         return balance.sliding
     return balance.sliding - balance.friction
@@ -381,7 +382,7 @@ def list_flaws(history: History) -> Iterator[Caution]:
 
 
 def _describe_divergence(history: History) -> str | None:
-    """Return a message with the time at which the energy diverges; None for a sound run."""
+    """Return a message with the time at which the energy diverges; None if the run is sound."""
     balance = history.balance
     if (
         balance is None
@@ -393,7 +394,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # number of states that are earlier than each state by more than the share _WITHIN of the record
+    # This array counts, for each state, the states that are earlier by more than the share _WITHIN of the record.
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST

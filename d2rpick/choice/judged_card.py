@@ -98,7 +98,7 @@ def print_judged_card(
     printing: Printing,
     done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[PairVerdict, ...]] | None:
-    """Print the card for some windows, with the verdicts that ``judge`` returns for the printed tr and td.
+    """Print the card for windows, with the verdicts that ``judge`` returns for the printed times tr and td.
 
     The history completes ``printing``.  In the windows ``done`` the run is already switched: they are printed too, but
     this run cannot show whether they are good.  The result is None if the parts, or for some solvers the main nodes,
@@ -163,7 +163,7 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # There is no energy level to match.
+    if verdict.situation.at_rest:  # At rest, no energy level has to be matched.
         return
     measures = [
         f"{name} {value:.3f}"

@@ -1,4 +1,4 @@
-"""Declare the options of a choice: type, default, help and range, the commands that have each, and what it limits.
+"""Declare the options of a choice: type, default, help, range, and the commands that have each option.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -166,7 +166,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # Rigid elements do not limit the time step, so the time step cannot become smaller.
+    # Rigid elements do not limit the time step, so it cannot become smaller than that of the deformable run.
     step_ratio: float | None = make_option(
         "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Radioss output that contains part momenta
+# Name of the Radioss output that contains part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
@@ -262,7 +262,7 @@ def _list_notes(
 
 
 def _measure_sampling(time: Samples) -> Sampling | None:
-    """Return the output intervals between the states; None for fewer than two states."""
+    """Return the output intervals between the states; None if there are fewer than two states."""
     steps = np.diff(time)
     if not steps.size:
         return None
@@ -383,7 +383,7 @@ def _assess_health_of_run(
 
 
 def _read_history(run: OpenedRun, selection: Selection) -> History | None:
-    """Return the history to be judged; None if the user has to choose an energy, or there is no state."""
+    """Return the history to be judged; None if the user has to choose an energy, or if there are no states."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):

@@ -49,7 +49,7 @@ _EXPERIMENTS: Final = {
 }
 COMMANDS: Final = _WORK | _EXPERIMENTS
 COULD_NOT_RUN: Final = 2
-BROKEN_PIPE: Final = 141  # exit code that a shell reports if SIGPIPE ended the program
+BROKEN_PIPE: Final = 141  # Exit code that a shell reports if SIGPIPE ended the program.
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # type of a command function; click's decorators have no narrower type
+Decorated = Any  # Type of a command function; click's decorators have no narrower type.
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
@@ -362,7 +362,7 @@ def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def open_judging_run(request: Request) -> Run | None:
-    """Open the history with which cards are judged; return None if none is given."""
+    """Open the history with which cards are judged; return None if no history is given."""
     if not request.history:
         return None
     # Imported here to keep start-up fast.

@@ -129,12 +129,12 @@ class Output:
 
     @property
     def file(self) -> str | None:
-        """Name of the file for the result; None for stdout."""
+        """Name of the file for the result, or None if the result goes to stdout."""
         return None if self.output_file == "-" else self.output_file
 
     @property
     def columns(self) -> int:
-        """Width of the terminal that shows the result [columns]; 0 if no terminal does."""
+        """Width of the terminal that shows the result [columns]; 0 if no terminal shows the result."""
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:

@@ -117,7 +117,7 @@ def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
 
 
 def _make_reading_request(ctx: click.Context) -> Request:
-    """Return the reading options of the command line as a request."""
+    """Return the options of the command line that define how files are read, as a request."""
     from d2rpick.api.request import Request
 
     return Request(

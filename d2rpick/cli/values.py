@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
     FloatType = click.ParamType[float]
 else:
-    FloatType = click.ParamType  # this class is generic from click 8.4 on
+    FloatType = click.ParamType  # This class is generic since click 8.4.
 
 CARDS: Final = tuple(list_options(Cards))
-_PAIR: Final = 2  # number of values of an option whose value is a pair
-# Options that apply only together with another option; settings may give them to commands without it.
+_PAIR: Final = 2  # Number of values of an option whose value is a pair.
+# Options that apply only together with another option; settings may also give them to commands that lack it.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),

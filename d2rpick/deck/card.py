@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import Block
 
 
-STANDARD, LONG = 10, 20  # width of a field in standard and in long format [characters]
+STANDARD, LONG = 10, 20  # Width of a field in standard and in long format [characters].
 # Pattern of the text between commas. A comma inside an expression, as in <max(1,2)>, does not separate fields.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
@@ -51,7 +51,7 @@ class CardField(NamedTuple):
 
     text: str
     block: Block
-    distance: int  # number of lines from the keyword to the field
+    distance: int  # Number of lines from the keyword to the field.
     column: int
 
     @property
@@ -76,7 +76,7 @@ Problem = tuple[CardField, str]
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """The value of a field; ``problem`` says why ``value`` is only the default, and is empty otherwise.
+    """The value of a field; if ``value`` is only the default, ``problem`` gives the reason.
 
     ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
@@ -195,7 +195,7 @@ class Card:
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Return all data lines, including blank ones, without comments."""
+        """Return all data lines, including blank lines, but no comments."""
         return tuple(
             [
                 Row(self.block, distance, text, self.width)
@@ -210,7 +210,7 @@ class Card:
 
     @cached_property
     def data(self) -> tuple[Row, ...]:
-        """Return the data lines that are not blank, without the title line of a keyword with ``_TITLE``."""
+        """Return the data lines that are not blank, except the title line of a keyword with ``_TITLE``."""
         if "TITLE" in self.name:
             return tuple(row for row in self.rows[1:] if not row.blank)
         return self.lines
@@ -234,7 +234,7 @@ class Card:
         return self._number(row, column.position, default, float)
 
     def integer(self, row: Row, column: CardColumn, default: int = 0) -> Value[int]:
-        """Read an integer; a real number without a fraction is accepted."""
+        """Read an integer; a real number is accepted if its fraction is zero."""
         return self._number(row, column.position, default, int)
 
     def numbers(self, row: Row, line: DataLine) -> list[Any]:
@@ -304,7 +304,7 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """The parameters visible in one file: local parameters hide those of including files and global ones.
+    """The parameters visible in one file: local parameters hide global parameters and those of including files.
 
     If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
     warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
@@ -443,7 +443,7 @@ class Scope:
         )
 
     def _number(self, name: str) -> Number:
-        """Return the value of a numeric parameter; raise ExpressionError if it has none."""
+        """Return the value of a numeric parameter; raise ExpressionError if the parameter has no value."""
         definition = self.definition(name)
         if definition is None:
             if later := self.definitions(name):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Kind = type[int] | type[float] | type[str]
 Cell = int | float | str
 
-WIDTH: Final = 10  # width of a field [characters]
+WIDTH: Final = 10  # Width of a field [characters].
 
 
 class CardColumn(NamedTuple):
@@ -65,7 +65,7 @@ def words(names: str, width: int = WIDTH) -> list[CardColumn]:
 
 
 def blank(width: int) -> list[CardColumn]:
-    """Declare a column without a name, which stays blank."""
+    """Declare a column that has no name and stays blank."""
     return [CardColumn("", str, width, 0)]
 
 
@@ -107,7 +107,7 @@ class DataLine:
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
-        """Return a line with these values. A column without a value gets 0, a blank or ``0.0``, by its type."""
+        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, by the type of its column."""
         assert values.keys() <= self._columns.keys()
         defaults: dict[Kind, Cell] = {int: 0, float: 0.0, str: ""}
         return "".join(

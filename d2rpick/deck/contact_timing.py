@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Spans = tuple[Times, ...]
 
 
-_ROUNDING: Final = 1e-12  # relative rounding error of a sum of times
+_ROUNDING: Final = 1e-12  # Relative rounding error of a sum of times [-].
 
 
 class Pushes(NamedTuple):
@@ -146,12 +146,12 @@ def _find_least_wait(
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Return the first span that begins at or after a time; if there is none, return infinite times."""
+    """Return the first span that begins at or after a time; if there is no such span, return infinite times."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Return the last span that ends at or before a time; if there is none, return times of minus infinity."""
+    """Return the last span that ends at or before a time; if there is no such span, return minus infinity twice."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

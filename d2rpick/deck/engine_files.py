@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 # Each window has its own time-step limit, so that later windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-# Largest number of engine runs, because the names of time history files have two digits for it.
+# Largest number of engine runs, which has two digits in the names of time history files.
 MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end [time], and the time-step limit while bodies are rigid; else None."""
+    """An engine run: its number, its end [time], and the time-step limit if bodies are rigid, else None."""
 
     number: int
     stop: float

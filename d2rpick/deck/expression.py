@@ -26,7 +26,7 @@ _TOKEN: Final = (  # This pattern is compiled at its first use, to keep start-up
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # Reference to a parameter, such as &tend.
 # Largest depth of nested parentheses, so that the recursion cannot exhaust Python's stack.
 _DEEPEST = 50
-LONGEST = 40  # largest number of characters of a number in a deck
+LONGEST = 40  # Largest number of characters of a number in a deck.
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -37,9 +37,9 @@ class ExpressionError(Exception):
     """Raised inside the deck reader for a string that is not a number; the message says why."""
 
 
-@lru_cache(4096)  # Most fields are blank or 0, so results are cached.
+@lru_cache(4096)  # Results are cached, because most fields are blank or 0.
 def parse_number(text: str) -> Number:
-    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` without the exponent letter.
+    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` (no exponent letter).
 
     Examples
     --------
@@ -216,7 +216,7 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
-        """Evaluate the whole text."""
+        """Evaluate the expression, which must end with the text."""
         value = self.nested()
         if self.tokens[0]:
             raise self.unexpected()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    Spans = Sequence[tuple[float, float]]  # start and end of each time span [time]
+    Spans = Sequence[tuple[float, float]]  # Start and end of each time span [time].
 
 
 class ForceSwitch(NamedTuple):

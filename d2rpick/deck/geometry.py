@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-# number of elements processed at once, whose arrays fit into the processor's cache
+# Number of elements processed at once, whose arrays fit into the processor's cache.
 _PIECE: Final = 1 << 14
 # Nodes of each face of a brick, in the order seen from outside.
 _FACES: Final = (

@@ -73,9 +73,9 @@ _OPTIONS: Final = {
     ),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# Keywords without elements, which change neither the mass nor the cost of a part.
+# Keywords that define no elements and change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
-_TEN: Final = 10  # number of nodes in the second line of a solid element
+_TEN: Final = 10  # Number of nodes in the second line of a solid element.
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = (
     "MAT_DAMPER",
@@ -275,7 +275,7 @@ def _list_nodes(
 
 
 def _read_watched_nodes(deck: Deck) -> Integers:
-    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one with a title."""
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title."""
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
@@ -320,7 +320,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
     """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        # Seat-belt keywords without elements: slip ring, retractor, sensor and so on.
+        # Seat-belt keywords that define no elements: slip ring, retractor, sensor and so on.
         fitting = card.name.startswith("ELEMENT_SEATBELT_")
         if (
             card.name.startswith("ELEMENT_")

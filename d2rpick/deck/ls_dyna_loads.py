@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
 
-_PART_ID, _NODE_SET = 3, 4  # values of SSTYP and MSTYP that name a part or a node set
+_PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP that name a part or a node set.
 # Beginnings of further keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = (
     *(
@@ -84,10 +84,10 @@ CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))
 _ALONG: Final = {f"LOAD_BODY_{letter}": axis for axis, letter in enumerate("XYZ")}
 _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
-# values of DOF that add a second line to a prescribed motion
+# Values of DOF that add a second line to a prescribed motion.
 _OWN_CENTRE: Final = (9, 10, 11)
-_RELATIVE: Final = 4  # value of VAD that adds a second line to a prescribed motion
-# Largest distance of a node on the plane of a *CONSTRAINED_GLOBAL, as a fraction of the model size.
+_RELATIVE: Final = 4  # Value of VAD that adds a second line to a prescribed motion.
+# A node lies on the plane of a *CONSTRAINED_GLOBAL if its distance is below this share of the model size [-].
 _FLAT: Final = 1e-4
 
 

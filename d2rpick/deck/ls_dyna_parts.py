@@ -46,7 +46,7 @@ _EXTRA_LINES: Final = {
 # The options AVERAGED and TITLE add no line.
 _FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # value of IRCS with which *PART_INERTIA has one more line
+_ROTATED = 1  # Value of IRCS with which *PART_INERTIA has one more line.
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Cached node sets of each deck.
@@ -107,7 +107,7 @@ _ABLE: Final = (
     "NODE_TO_SURFACE",
 )
 _MOST_ROWS = (
-    # Largest number of lines of a contact or wall without an id; more lines may define a second contact.
+    # A contact or wall that has no id has at most this number of lines; more lines may define a second contact.
     8
 )
 
@@ -135,7 +135,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Material, title and section of each part, and part sets by id; None for a kind of set that cannot be read.
+    """Material, title and section of each part, and part sets by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -407,7 +407,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that are searched for shared nodes, or the other cards if ``searched`` is False."""
+    """Return the element cards that may define shared nodes, or the other cards if ``searched`` is False."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -536,7 +536,7 @@ _CONSTRAINTS: Final[
 
 
 class Entity(NamedTuple):
-    """A contact or rigid wall: keyword, id and title (0 and empty for none), and its number in the deck."""
+    """A contact or rigid wall: keyword, id and title (0 and empty if missing), and its number in the deck."""
 
     keyword: str
     id: int
@@ -556,7 +556,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id, or else the one with this number in order of definition.
+        """Return the contact or wall with this id, or else that with this number in order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.columns import CardColumn
     from d2rpick.deck.reader import Deck
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # Function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
     Forces = Callable[[str, int, float], Spans | None]
 

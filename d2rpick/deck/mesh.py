@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card, Scope
     from d2rpick.deck.source import Block
 
-    # first column and width of each field [characters]
+    # First column and width of each field [characters].
     Layout = Sequence[tuple[int, int]]
     Integers = NDArray[np.int64]
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
 
-_WIDEST: Final = 240  # number of characters of the longest line of a mesh
+_WIDEST: Final = 240  # Number of characters of the longest line of a mesh.
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
 # Characters that show that a line has no fixed columns, so that it is parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
-# Index of the last character of most ids; a line that is not blank there is not blank at all.
+# Index of the last character of most ids; a line with a character at this index is not blank.
 _ID_ENDS: Final = 7
-_HIGHEST: Final = 10**17  # upper limit of ids; larger numbers would overflow
-NO_NODE: Final = -1  # index of a missing node
-_DENSE: Final = 50_000_000  # largest id for which a table of all ids fits into memory
-NOTHING: Final = -1  # placeholder for a field that contains no id
+_HIGHEST: Final = 10**17  # Upper limit of ids; larger numbers would overflow.
+NO_NODE: Final = -1  # Index of a missing node.
+_DENSE: Final = 50_000_000  # Largest id for which a table of all ids fits into memory.
+NOTHING: Final = -1  # Placeholder for a field that contains no id.
 # Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 
@@ -50,7 +50,7 @@ NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 class Lines:
-    """The data lines in a piece of a mesh, without comments and blank lines.
+    """The data lines in a piece of a mesh; comments and blank lines are left out.
 
     ``in_columns``: all lines have fixed columns.
     """
@@ -135,7 +135,7 @@ class Lines:
         return [text.expandtabs(8)[start : start + width] for start, width in fields]
 
     def _value(self, text: str) -> float:
-        """Return the value of a field: 0 for a blank, NaN for text that is not a number."""
+        """Return the value of a field: 0 if it is blank, NaN if it is not a number."""
         if not text.strip():
             return 0.0
         try:
@@ -159,7 +159,7 @@ def _read_pieces(block: Block) -> Iterator[bytes]:
 
 
 def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return lines as rows of equal length, padded with blanks, without line ends."""
+    """Return lines as rows of equal length, with blanks in place of line ends."""
     ends = np.flatnonzero(raw == ord("\n"))
     if not raw.size or raw[-1] != ord("\n"):
         ends = np.append(ends, raw.size)
@@ -335,7 +335,7 @@ class Mesh(NamedTuple):
         return kinds_by_part
 
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
-        """Yield notes on elements of undefined parts and on nodes without coordinates.
+        """Yield notes on elements of undefined parts and on nodes that have no coordinates.
 
         ``sign`` begins the keywords.
         """

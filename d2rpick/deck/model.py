@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-# assumed number of integration points through the thickness, because most shells have 2 to 5
+# Assumed number of integration points through the thickness of a shell; most shells have 2 to 5.
 _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Kinds of elements that stay deformable when their part is switched to rigid.
@@ -54,7 +54,7 @@ class Hold(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Gravity along a global ``axis`` (None for a local axis), with the constant ``values`` of its load curve.
+    """Gravity along a global ``axis`` (or None if the axis is local), with the constant ``values`` of its load curve.
 
     ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
     nodes.
@@ -110,7 +110,7 @@ class Boundary(NamedTuple):
         )
 
     def placed(self, table: NodeTable) -> Boundary:
-        """Return the same boundary with node indices in place of node ids."""
+        """Return the boundary with node indices in place of node ids."""
         return Boundary(
             place_nodes(self.holds, table),
             self.gravity and place_nodes(self.gravity, table),
@@ -209,7 +209,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """Data of one part without its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
+    """Data of one part, except its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
 
     id: int
     title: str
@@ -386,7 +386,7 @@ class Inventory:
 
     @cached_property
     def ready(self) -> tuple[frozenset[int], ...]:
-        """Return, for each rigid body in ``switched``, the parts that belong to it completely, without springs."""
+        """Return, for each rigid body in ``switched``, the parts that belong to it completely, except springs."""
         whole_parts = []
         for _, nodes, parts in self.switched:
             mask = self._mask(parts)
@@ -429,7 +429,7 @@ class Inventory:
 
     @property
     def springs(self) -> frozenset[int]:
-        """Parts that have only springs and the like."""
+        """Parts that consist only of springs and other discrete elements."""
         return frozenset(
             part for part, kinds in self.counts.items() if {*kinds} <= DISCRETE
         )

@@ -43,9 +43,9 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Largest distance of a node from its plane, as a fraction of the size of the piece.
+# A node lies on a plane if its distance is below this share of the size of the piece [-].
 _FLAT: Final = 1e-6
-# Smallest mass of a piece that moves other pieces on springs, as a fraction of the mass of all these pieces.
+# A piece moves other pieces on springs only if it has at least this share of the mass of all these pieces [-].
 _HEAVY: Final = 0.05
 
 
@@ -255,7 +255,7 @@ class InnerPeriod(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A piece of the mesh that is connected without springs: its parts and its mass."""
+    """A piece of the mesh that elements other than springs connect: its parts and its mass."""
 
     parts: frozenset[int]
     mass: float

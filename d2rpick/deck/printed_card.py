@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
-WIDTH = 10  # width of a field [characters]
+WIDTH = 10  # Width of a field [characters].
 # Largest number of characters of a number; a blank separates the number from the next field.
 LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
@@ -178,7 +178,7 @@ def write_comments(remarks: Sequence[str]) -> Iterator[str]:
 
 
 def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
-    """Return the windows without negative zeros; raise DeckError unless each begins after the previous window."""
+    """Return the windows with 0.0 in place of -0.0; raise DeckError unless each begins after the previous window."""
     if not windows:
         raise DeckError("no window was given, expected at least one tr and td")
     for tr, td in windows:
@@ -197,7 +197,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
-    """Return the distinct ids; raise DeckError if there are none, or if an id needs more than ``digits`` columns."""
+    """Return the distinct ids; raise DeckError if no id is given, or if an id needs more than ``digits`` columns."""
     if not ids:
         raise DeckError(
             "no id of a part or body to switch was given, expected at least one"

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.radioss_rigid import Body
 
-# value of Ikrem with which the starter keeps the nodes of a body in rigid walls
+# Value of Ikrem with which the starter keeps the nodes of a body in rigid walls.
 _STAYS: Final = 1
 # Column of the node group in the first line below the title, by keyword of the initial velocity.
 _GROUP_OF_VELOCITY: Final = dict.fromkeys(
@@ -60,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """The rigid bodies that switch given parts, and the cards of the new ones.
+    """The rigid bodies that switch given parts, and the cards of new bodies among them.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -169,7 +169,7 @@ def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
 
 
 def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[int]:
-    """Return the parts that have elements other than springs; if there are none, return all parts."""
+    """Return the parts that have elements other than springs; if no part has such elements, return all parts."""
     return [
         part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
     ] or list(parts)

@@ -10,7 +10,7 @@ from typing import Final
 
 from d2rpick.deck.columns import DataLine, blank, integers, reals, words
 
-_REAL: Final = 20  # width of the column of a real number [characters]
+_REAL: Final = 20  # Width of the column of a real number [characters].
 
 # Lines of /BEGIN: the version of the input, and a line of units.
 BEGIN: Final = DataLine(integers("Invers"))

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # largest number of digits of an id
+_DIGITS = 10  # Largest number of digits of an id.
 
 # Kinds of elements whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {
@@ -50,9 +50,9 @@ WITHOUT_FRAME: Final = {
     "BRIC20",
     "SHEL16",
 }
-_RIGID_PARTS_SINCE: Final = 2612  # first input version in which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe that selects a co-rotational frame
-# Values of Isolid of bricks without a co-rotational frame (12 according to the help up to 2017).
+_RIGID_PARTS_SINCE: Final = 2612  # First input version in which /PART has Irigid.
+_ICOROTATIONAL: Final = 2  # Value of Iframe that selects a co-rotational frame.
+# Values of Isolid of bricks that have no co-rotational frame (12 according to the help up to 2017).
 _NOT_TURNED: Final = {
     1,
     2,
@@ -115,7 +115,7 @@ def split_keyword(block: Block) -> tuple[str, ...]:
 
 
 def parse_id(text: str) -> int:
-    """Read an id from a keyword line or a field of 10 columns; 0 for other text."""
+    """Read an id from a keyword line or a field of 10 columns; other text gives 0."""
     text = text.strip()
     return int(text) if text.isdecimal() and len(text) <= _DIGITS else 0
 
@@ -160,7 +160,7 @@ class RadiossLeg:
     starts: list[InitialVelocity] = field(default_factory=list)
     # Ids of the sensors that are reset at the start of the engine run.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # id of a sensor that ends the engine run at an unknown time
+    sensor: int = 0  # Id of a sensor that ends the engine run at an unknown time.
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
@@ -294,7 +294,7 @@ class Starter:
 
     @cached_property
     def version(self) -> int:
-        """Return the input version of /BEGIN; 0 if there is none."""
+        """Return the input version of /BEGIN; 0 if the deck names no version."""
         begin_cards = [card for card in self.named("BEGIN") if card.rows]
         rows = get_lines_below_title(begin_cards[-1]) if begin_cards else ()
         return begin_cards[-1].integer(rows[0], BEGIN["Invers"]).value if rows else 0
@@ -431,7 +431,7 @@ class Starter:
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        # If several cards define it, the solver uses the first card.
+        # If several cards define a property, the solver uses the first card.
         isolid, iframe = defaults[0] if defaults else (0, 0)
         solids = (
             card

@@ -87,7 +87,7 @@ def list_run_files(path: str) -> list[str]:
 
 
 def find_root(path: str) -> str:
-    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``, empty for another name.
+    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``, else empty.
 
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.

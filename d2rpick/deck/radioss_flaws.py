@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import RadiossRun
 
-_PENALTY_SINCE: Final = 2026  # first input version in which a rigid wall has Iform
+_PENALTY_SINCE: Final = 2026  # First input version in which a rigid wall has Iform.
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
-# words that may precede the geometry in the keyword of a rigid wall
+# Words that may precede the geometry in the keyword of a rigid wall.
 _WITH_KIND: Final = {"LAGMUL", "THERM"}
 
 
@@ -210,7 +210,8 @@ def _find_nodes_near_wall(
         if not (ids == node).any():
             return None
         points[0] = coordinates[ids == node][0]
-    with np.errstate(invalid="ignore", over="ignore"):  # Some fields are not numbers.
+    # Fields that are not numbers give NaN, which must not cause numpy warnings.
+    with np.errstate(invalid="ignore", over="ignore"):
         distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
         return None

@@ -388,7 +388,7 @@ def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
 
 
 def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float | None:
-    """Read a positive number in a column; return None for anything else."""
+    """Read a positive number in a column; return None if the field contains anything else."""
     value = parse_real(column.cut(rows[row])) if row < len(rows) else 0.0
     return value if value > 0 else None
 
@@ -493,7 +493,7 @@ def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
 def _find_body_holds(
     run: RadiossRun, starter: Starter, holds: Sequence[model.Hold]
 ) -> Iterator[model.Hold]:
-    """Yield a support of all nodes of a rigid body that is on, for each support of its main node."""
+    """Yield a support of all nodes of a rigid body that is active, for each support of its main node."""
     for body in starter.bodies:
         if body.sensor or body.node.value in run.named:
             members = None
@@ -580,8 +580,8 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
         )
 
 
-# Joints connect parts that share no nodes: ties, and rigid bodies that are always on.
-# Joints must be off while a part is rigid, because a node cannot belong to two rigid bodies.
+# Joints connect parts that share no nodes: ties, and rigid bodies that are always active.
+# Joints must be inactive while a part is rigid, because a node cannot belong to two rigid bodies.
 # Altair's help on incompatible kinematic conditions is the source of this rule.
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    # kind of the members of a node group, and their ids
+    # Kind of the members of a node group, and their ids.
     Group = tuple[str, tuple[int, ...]]
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.

@@ -287,7 +287,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of one unit of a body, which is rigid from the start unless it is deactivated there."""
+    """Return the windows of a unit of a body, which is rigid from the start unless it is deactivated at the start."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (
@@ -412,7 +412,7 @@ def find_rigid_parts(
 
 
 def find_time_units(run: RadiossRun) -> tuple[str, str]:
-    """Return the time units that /BEGIN names for the starter deck and for the computation; empty if it names none."""
+    """Return the time units that /BEGIN names for the starter deck and for the computation; empty if there are none."""
     cards = run.starter.named("BEGIN") if run.starter else ()
     rows = next((card.rows for card in cards), ())
     if len(rows) < _LINES_OF_BEGIN:
@@ -484,7 +484,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies that contain whole parts and are named by no engine run, in a run with ``windows``.
+    """Return the bodies that contain complete parts and that no engine run names, in a run with ``windows``.
 
     None if there are none.
     """

@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Row
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
     # Function that returns the time spans in which the force of an interface or rigid wall acts, or None.
     Forces = Callable[[str, int], Spans | None]
 
 # First input version in which a time sensor has an end (Tstop).
 STOPS_SINCE: Final = 2023
-NEVER: Final = 1e20  # smallest time that is treated as never reached
+NEVER: Final = 1e20  # Smallest time that is treated as never reached.
 # Kinds of force sensors, with the names of their forces in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
 # Types of /INTER that exert no contact force on a flying body, such as ties.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
-# relative rounding error of the times in a T01 file, which have seven digits
+# Relative rounding error of the times in a T01 file, which have seven digits [-].
 _SINGLE: Final = 1e-6
 
 

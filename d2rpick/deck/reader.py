@@ -78,7 +78,7 @@ _LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled at its first 
 # Pattern of keywords that seem to be switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # largest depth of nested includes
+_DEEPEST = 60  # Largest depth of nested includes.
 _MOST_FILES = 10_000
 _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
@@ -222,8 +222,9 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    long: bool = False  # True if the main file is in long format at its end.
-    # restarts of the run by file name
+    # The value is True if the main file is in long format at its end.
+    long: bool = False
+    # Restarts of the run by file name.
     restarts: dict[str, Restart] = field(default_factory=dict)
 
     @property

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Value
 
 _KEYWORD: Final = "RIGID_DEFORMABLE"
-# size of the largest file that may be a small restart [bytes]
+# Size of the largest file that may be a small restart [bytes].
 _LARGEST: Final = 1 << 20
 
 

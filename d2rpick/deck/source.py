@@ -21,26 +21,27 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# Number of bytes searched at a time; the buffer is reused and fits into the processor's cache.
+# The search processes this number of bytes at a time, so that its buffer fits into the processor's cache.
 _SEARCHED: Final = 3 << 18
 # Number of additional threads; they copy bytes in parallel, but only one thread searches at a time.
 _HELPERS: Final = 1
-# Number of pieces that one thread searches before a second thread has started.
+# Number of pieces that one thread processes before a second thread has started.
 _ALONE: Final = 4
-# Number of bytes before a piece that are searched again, because a mark may cross the start of the piece.
+# The search repeats this number of bytes before a piece, because a mark may cross the start of the piece.
 _LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
 # Offset of a letter of the mark that mesh data never contains, so that the search for it is fast.
 _ANCHOR: Final = _PGP.index(b"G")
-BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 
-_PIECE: Final = 4 << 20  # number of bytes of whole lines that are processed together
+# Complete lines are processed in pieces of this number of bytes.
+_PIECE: Final = 4 << 20
 # Number of parts of a piece in which line ends are counted; each part fits into the processor's cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # number of bytes that are searched for the first line end
-_HEAD: Final = 1024  # number of bytes of a keyword line that are read at most
-# Number of bytes before a keyword that are searched for comments on the keyword.
+_FIRST: Final = 1 << 16  # The first line end is expected in this number of bytes.
+_HEAD: Final = 1024  # At most this number of bytes of a keyword line is read.
+# Comments on a keyword are expected in this number of bytes before the keyword.
 _BEFORE: Final = 4096
 # This pattern is compiled at its first use, to keep start-up fast.
 _SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
@@ -86,12 +87,12 @@ class _Search:
         self._helping: list[_thread.LockType] = []
 
     def call_for_help(self) -> None:
-        """Start an additional thread without waiting for it."""
+        """Start an additional thread and return at once."""
         helping = _thread.allocate_lock()
         helping.acquire()
         with suppress(
             RuntimeError
-        ):  # No further thread is available, so this one searches alone.
+        ):  # No further thread is available, so this thread searches alone.
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
@@ -120,7 +121,7 @@ class _Search:
                     )
                 else:
                     marks_by_piece[begin] = ()
-        # Only after this check is it certain that the file has not changed.
+        # This check shows whether the file has changed during the search.
         self._found |= marks_by_piece
 
     def stop(self) -> None:
@@ -243,7 +244,7 @@ class SourceFile:
         return self._file.read(start, self._file.size if end is None else end)
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
-        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in pieces of whole lines."""
+        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in pieces that end with a line end."""
         end = min(self._file.size, self._file.size if end is None else end)
         size = self._piece
         while start < end:
@@ -315,7 +316,7 @@ class Block:
     source: SourceFile
     start: int
     end: int | None
-    head: str  # text of the keyword line
+    head: str  # Text of the keyword line.
 
     @property
     def encrypted(self) -> bool:
@@ -333,10 +334,10 @@ class Block:
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Return the data lines without comments, each with the number of lines from the keyword line."""
+        """Return the data lines, but no comments, each with the number of lines from the keyword line."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
-        # Without this line, the block would contain the blanks before the next keyword.
+        # If this line were kept, the block would contain the blanks before the next keyword.
         if last and self.end is None:
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)

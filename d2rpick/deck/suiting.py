@@ -18,12 +18,12 @@ from d2rpick.deck.switching import read_switching
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-# first id of new switch sets and part sets, unless the deck uses it
+# First id of new switch sets and part sets, unless the deck uses this id.
 _FIRST: Final = 901
 
 
 class Suiting(NamedTuple):
-    """What a deck requires of a card; None and False stand for no requirement.
+    """What a deck requires of a card; None and False mean that there is no requirement.
 
     ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
     switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the

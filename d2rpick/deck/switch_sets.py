@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Printing
 
-# values of NRBF and NCSF that delete and activate the constraints on the parts
+# Values of NRBF and NCSF that delete and activate the constraints on the parts.
 _DELETE, _ACTIVATE = 1, 2
 
 
@@ -46,7 +46,7 @@ def write_deformable_lines(
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Return the parts grouped by their lead part; parts without a lead part come first, under 0."""
+    """Return the parts grouped by their lead part; parts that have no lead part come first, under 0."""
     leads = _find_leads(ids, printing)
     by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 
-BY_TIME, BY_SENSOR = 0, 5  # values of CODE for switches by time and by sensor
+BY_TIME, BY_SENSOR = 0, 5  # Values of CODE for switches by time and by sensor.
 _KINDS: Final[dict[str, Kind]] = {
     "DEFORMABLE_TO_RIGID": "plain",
     "DEFORMABLE_TO_RIGID_AUTOMATIC": "automatic",
@@ -119,7 +119,7 @@ class SwitchSet:
 
     @property
     def time_field(self) -> CardField:
-        """Return the field that contains the switching time; for a card without such a field, return the keyword.
+        """Return the field that contains the switching time; if the card has no such field, return the keyword.
 
         It is TIME1, or the end of the run before a restart.
         """
@@ -399,7 +399,7 @@ class Unit(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """Return the part id; None for a part set or rigid body whose parts are unknown."""
+        """Return the part id, or None if the unit is a part set or rigid body whose parts are unknown."""
         return None if self.is_set or self.is_body else self.id
 
 

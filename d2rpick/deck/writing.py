@@ -55,7 +55,7 @@ _ONCE = {
     "END",
 }
 
-# An engine run writes its restart file only at its end
+# An engine run writes its restart file only at its end.
 _NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -267,7 +267,7 @@ def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
 def _keep_bodies_off(
     legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
 ) -> Iterator[str]:
-    """Return the lines that keep bodies of the run off in a printed engine run; otherwise they are rigid from time 0.
+    """Return the lines that keep bodies inactive in a printed engine run; they would be rigid from time 0 otherwise.
 
     Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
     """
@@ -277,7 +277,7 @@ def _keep_bodies_off(
         node for node in find_bodies_kept_off(legs) if node not in switched_nodes
     ]
     if printed_leg.cap is None:
-        # An engine run without time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
+        # An engine run that has no time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
         return write_numbers(off_nodes)
     return write_bodies_off(off_nodes)
 
@@ -294,14 +294,14 @@ def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
 def _edit_file(
     name: str, content: bytes, sensors: Mapping[int, int], left_out: Collection[int]
 ) -> bytes:
-    """Return a file of the starter deck with sensors and without the rigid bodies ``left_out`` (by id)."""
+    """Add sensors to a file of the starter deck, and remove the rigid bodies with the ids ``left_out``."""
     return _add_sensors(
         SourceFile(name, _remove_bodies(SourceFile(name, content), left_out)), sensors
     )
 
 
 def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
-    """Return a file of the starter deck without the bodies with these ids."""
+    """Remove the rigid bodies with these ids from a file of the starter deck."""
     content = source.read(0)
     for block in reversed([*read_blocks(source)]):
         if (

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import NodeMotion, Samples
     from d2rpick.histories.names import Part
 
-# Function that reads the motion of those of the given nodes whose motion is written; None if there are none.
+# Function that reads the written motion of given nodes, and leaves out nodes whose motion is not written.
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body.

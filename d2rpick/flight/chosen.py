@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
-# An energy with at least this many turning points may vibrate about a level. With fewer it must be constant.
+# An energy with at least this number of turning points may vibrate about a level; otherwise it must be constant.
 _LEAST_TURNS: Final = 4
 
 

@@ -1,4 +1,4 @@
-"""Decide when the parts fly, from the best source of evidence for the window around td in which only gravity acts."""
+"""Decide when the parts fly: from the most reliable data that show a window around td in which only gravity acts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Sources of a flight, best first.
+# Names of the data that can show a flight, the most reliable first.
 SOURCES: Final = (
     "given",
     "momentum",
@@ -43,8 +43,8 @@ SOURCES: Final = (
 )
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# Largest work of a load in a flight, as a share of the energy.
-# This work causes a deformation error of 2 %, which is the smallest error that affects the ranking of pairs.
+# Largest work that a load may do on the parts in a flight, as a share of their internal energy [-].
+# This work causes a deformation error of 2 %; smaller errors do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
 # Sources that must confirm each flight from a better source, because they contain the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
@@ -108,7 +108,7 @@ class Flight(NamedTuple):
 
 
 def _return_false(_: float) -> bool:
-    """Return False for each time."""
+    """Return False for any time, as the default of ``is_contradicted``."""
     return False
 
 
@@ -377,7 +377,7 @@ def _find_flight_by_energies(
     *,
     level: bool,
 ) -> FreeFlight | None:
-    """Return the flight around td from energies; with ``level`` the internal energy must stay on one level.
+    """Return the flight around td from energies; if ``level`` is True, the internal energy must stay on one level.
 
     Energies alone do not see a fixed wall, which does no work.
     """
@@ -390,7 +390,8 @@ def _find_flight_by_energies(
             and isinf(flight.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
-            return None  # Without gravity, no load does work on a model in flight.
+            # If there is no gravity, no load does work on a model in flight.
+            return None
         if not (flight and has_whole_motion(history.balance, flight.start, flight.end)):
             flight = None
     return limit_to_unheld(history.surroundings, flight, history.parts, td)

@@ -40,11 +40,11 @@ _REACH_OF_DIGITS = 10.0
 # _ALONG_AXIS: while a load fades, gravity has at least this direction cosine with an axis [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
 # _DAMPED: damping that takes at most this share of the momentum in a window is not suspected to be a load [-].
-# _LEFT: stronger damping is a load if less than this share of the largest momentum remains [-].
+# _LEFT: damping that takes more is a load if less than this share of the largest momentum remains [-].
 _DAMPED, _LEFT = 0.2, 0.05
 # Damping that takes more than this share of the momentum from each state to the next is a load [-].
 _SHOWN = 0.1
-# Deviation allowed in a window without loads, as a share of the largest momentum and of its range.
+# Largest deviation of the momentum in a window without loads, as a share of its largest value and of its range [-].
 # A fading load that causes this deviation may change the momentum by twice as much over the window.
 # For a subset of the moving parts TOLERANCE is used instead, because the other parts of their body act on them.
 _ENOUGH = 3e-3
@@ -129,7 +129,7 @@ class Laws:
 
     @property
     def _carried(self) -> bool:
-        """Return True if a support must carry the parts in a window in which their momentum shows no force."""
+        """Return True if a support must carry parts whose momentum shows no force."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -246,7 +246,7 @@ class Laws:
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
-        """Return the acceleration in a window [length/time^2]: 0 if none is seen, None if it is not gravity.
+        """Return the acceleration in a window [length/time^2]: 0 if it is negligible, None if it is not gravity.
 
         NaN if neither the mass nor the work of the force is known.
         """
@@ -338,7 +338,8 @@ class Laws:
     @cached_property
     def fall(self) -> bool:
         """Return True if the parts fall under gravity at some time. If they never do, something supports them."""
-        self.fall = False  # preliminary value, which is needed while `fall` is computed
+        # A preliminary value is set, because the computation of `fall` needs one.
+        self.fall = False
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in list_moments(self.fit.time))

@@ -1,4 +1,4 @@
-"""Find flights from the internal energy if better evidence is missing, and refine those from the model's energies.
+"""Find flights from the internal energy if better data are missing, and refine flights found from other energies.
 
 Alone it is poor evidence and never certain, because a mild contact may leave no trace in it.  Therefore the window
 begins late, and ends early if a contact is seen.
@@ -36,7 +36,7 @@ _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # The energy level is the mean energy over this share of the time without load [-].
 # The level has changed once this mean leaves the band of the means before td, widened by its width at both ends.
 _LEVEL: Final = 1 / 8
-# _KNOWN: a landing is detected by comparison with this share of the time before it.
+# _KNOWN: a landing is detected by comparison with this share of the time before the landing [-].
 # _TURNED: smallest number of turning points of the energy in the time with which a landing is compared.
 _KNOWN, _TURNED = 3 / 4, 4
 
@@ -126,7 +126,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time after ``start`` at which the energy leaves its former range quickly [time], or None.
+    """Return the first time after ``start`` at which the energy quickly leaves its former range [time], or None.
 
     It is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's width: no
     vibration goes so far beyond its range of so long a time.
@@ -212,7 +212,7 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the energy exceeds the band that it has in them, or None."""
+    """Return the first time after some states at which the energy leaves its band in these states, or None."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None
@@ -258,7 +258,7 @@ def round_off(history: History) -> float:
 
 
 def find_largest(*terms: Samples | None) -> float:
-    """Return the largest absolute energy [energy]. Missing arrays are skipped; without any array it is 0."""
+    """Return the largest absolute energy [energy]. Missing arrays are skipped; the result is 0 if all are missing."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
@@ -273,7 +273,7 @@ def find_settled_time(
     end: float,
     unseen: float = 0.0,
 ) -> float | None:
-    """Return the time in a window from which an internal energy stays on one level; None if it drifts to the end.
+    """Return the time in a window after which an internal energy keeps its level; None if it drifts until the end.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ def _sum_later_losses(damped: Samples) -> Samples:
 
 
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
-    """Return the first state from which an energy stays on the level of its last quarter; None if that drifts.
+    """Return the first state from which an energy stays on the level of its last quarter; None if it drifts there.
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """

@@ -138,7 +138,7 @@ def estimate_grazing_spread(
 
 
 class _Contact(NamedTuple):
-    """Momentum of a body, the force on it without gravity, and gravity, at the ``time`` of all states (n,).
+    """Momentum of a body, gravity, and the other forces on the body, at the ``time`` of all states (n,).
 
     ``begin`` is the last state before the contact that ends the flight.
     """
@@ -222,7 +222,7 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
 
 
 def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
-    r"""Return how far the velocity error of a switch may move the next landing.
+    r"""Return by how much time the velocity error of a switch may move the next landing [time].
 
     A switch takes the velocity of the vibration from all parts, and freezes them away from their rest positions, by the
     amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass moves on as before, so that a
@@ -370,7 +370,7 @@ def _compute_share_towards_ground(momentum: Samples) -> float:
 
 
 def _find_direction_of_change(momentum: Samples) -> Samples | None:
-    """Return the unit vector along which a momentum (n, 3 or 1) changes, or its own if only rounding changes it.
+    """Return the direction in which a momentum (n, 3 or 1) changes, or its own direction if it is constant.
 
     None if the momentum is 0.
     """

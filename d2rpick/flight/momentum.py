@@ -40,10 +40,10 @@ _CONSTANT = 1e-6
 # A momentum, or its change, shows motion only if it exceeds its rounding error by this factor [-].
 _VISIBLE = 100
 # A larger set of parts is preferred only if its window is longer by this factor [-].
-# A part with a large momentum, such as a sled, increases the tolerance for all parts and thus the length of windows.
+# A part with a large momentum, such as a sled, increases the tolerance and the length of the windows of all parts.
 _LONGER = 1.1
 # _LOOK_BACK: attached parts are determined in this share of the record before td [-].
-# _LOOK_STATES: largest number of states used for this search.
+# _LOOK_STATES: largest number of states from which attached parts are determined.
 # _CANCELS: the sum of the momenta of a body deviates from a straight line by less than this share [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # A decrease of the summed deviation by less than this share is treated as rounding error [-].
@@ -53,7 +53,7 @@ _ROUNDED: Final = 1e-9
 _HELD = 0.01
 # The part momenta add up to the model's momentum within this share, unless a rigid body has absorbed some parts.
 _ALL_OF_IT: Final = 1e-2
-# _BY_ITSELF: a body flies separately if it does so for at least this share of the record [-].
+# _BY_ITSELF: a separate flight of a body counts if it lasts for at least this share of the record [-].
 # _OF_ITS_OWN: a body flies separately if its velocity differs from that of the others by at least this share [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
@@ -69,7 +69,7 @@ def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
 def find_flight_around(
     momenta: Momenta, td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
-    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and its window.
+    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and the window of its flight.
 
     Unless the set is given, the chosen parts are tried, these with the parts that move most against them, and all
     parts.
@@ -167,7 +167,7 @@ def _search_bodies_apart(momenta: Momenta, members: Sequence[int]) -> Iterator[i
 
 @remember
 def _find_flights_of_part(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
-    """Return the flights of one part by itself."""
+    """Return the flights of a single part."""
     return find_all_windows(momenta.time, partial(find_flight_of, momenta, (part,)))
 
 
@@ -219,7 +219,7 @@ def find_flight_of(
 def get_laws_of(
     momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
 ) -> Laws:
-    """Return the laws of free flight for a set of parts, computed once for all td."""
+    """Return the laws of free flight for a set of parts; the result is cached for all td."""
     if momenta.parts is None or np.isnan(momenta.mass(members)):
         whole = balance
     else:

@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
 # A part is not connected to the body if its relative velocity changes by less than this share [-].
-# The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
+# The relative velocity of a connected part exceeds this limit as soon as the body rotates by 0.01 degrees.
 _STEADY: Final = 1e-4
 # A position error is a lower bound if the other parts deform by more than this share of the part's motion [-].
 # In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
 # In a public car model with position errors that were 3 to 4 times too small, the deformation was 1.1 to 1.4 of it.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Position errors below this share of the largest acceptable one are negligible, even if they are underestimated [-].
+# Position errors below this share of the largest acceptable error are negligible, even if underestimated [-].
 _HARDLY: Final = 0.01
 # Largest acceptable position error as a share of the path of the body [-]; it is 1/3 of the margin before a contact.
 MOST_OF_PATH: Final = 0.01
@@ -323,7 +323,7 @@ def _collect_flying(
         wanted = {part.id for part in parts}
     flying = [
         i for i in momenta.moving if momenta.parts[i].id in ids
-    ]  # without fixed parts, such as the ground
+    ]  # Fixed parts, such as the ground, are left out.
     members = [i for i in flying if momenta.parts[i].id in wanted]
     return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
 
@@ -344,7 +344,7 @@ class RigidBody(NamedTuple):
 
 
 class Off(NamedTuple):
-    """Largest position error of a body [length], and its cause; ``body`` is named if there are several bodies.
+    """Largest position error of a body [length], and its cause; ``body`` is empty if there is only one body.
 
     ``assumed`` is True if no deck shows that the parts become one body.  ``at_least`` is True if the error may be
     larger.
@@ -363,7 +363,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies in a flight with their displacements. ``told`` lists the deck's bodies; if empty, one is assumed.
+    """Rigid bodies in a flight with their displacements; if ``told``, the bodies of the deck, is empty, one is assumed.
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them.

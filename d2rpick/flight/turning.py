@@ -113,7 +113,7 @@ class Turning(NamedTuple):
         )
 
     def _compute_slides(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements from ``tr`` to td without those by rotation, (k, 3) in the body's frame [length]."""
+        """Return the displacements (k, 3) from ``tr`` to td, except those by rotation, in the body's frame [length]."""
         at_td = _interpolate_at(self.time, self.place, np.array([td]))
         return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
 
@@ -202,7 +202,7 @@ def follow_turning(
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # centre of the parts according to the deck [length]
+    )  # This is the centre of the parts according to the deck [length].
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
     nodes = (nodes - home + middle[-1]) @ frames[-1].T
@@ -263,8 +263,9 @@ def _solve_turning(
     )
     kept_rate = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # angular momentum in the fixed frame of reference
-    momentum = kept_rate @ frames  # angular momentum in the frame of the body
+    )  # This is the angular momentum in the fixed frame of reference.
+    # This is the angular momentum in the frame of the body.
+    momentum = kept_rate @ frames
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light
     carried = _integrate_matrix(

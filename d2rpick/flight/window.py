@@ -16,34 +16,36 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# First tolerance for a free flight, as a share of the range over the record [-]; a contact exceeds it at once.
+# Initial tolerance for deviations from free flight, as a share of the range over the record [-].
+# A contact exceeds this tolerance at once.
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
 # If the tolerance is reduced, windows of other smooth motions shrink to less than half, but not those of flights.
 # _STAYS: share of its length that a window must retain to count as unchanged [-].
 # _STANDS: a window shrinks at one end only if its other end moves by at most this share of the length [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# For a vibration, the middle half of a window has at least this share of its misfit [-]; a smooth load leaves 1/8.
+# The misfit of a vibration in the middle half of a window is at least this share of that in the window [-].
+# For a smooth load, this share is 1/8.
 _RINGS = 1 / 3
 # SHORTEST: a flight lasts for at least this share of the record [-].
 # FEWEST: a flight has at least this number of states.
 SHORTEST, FEWEST = 0.05, 12
 # _ENDS: share of a window at each end that is not used to determine the misfit of the free flight itself [-].
-# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger in the whole window [-].
-# _REACH: factor by which any other misfit may be larger in the whole window, which has more states [-].
+# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger if the ends are included [-].
+# _REACH: factor by which any other misfit may be larger if the ends are included [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of any quantity [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
 # The search for long flights starts from every fifth of the times that find all flights.
 _FAR: Final = 5
-# Largest number of times that the ends of a window are cut off.
+# Largest number of times that the ends of one window are cut off.
 _MOST_SHRINKS = 8
 
 
 class FreeFlight(NamedTuple):
     """A window [time] in which ``parts`` fly freely together; None stands for the whole model.
 
-    ``end_seen`` is False if the record ends while it still flies.  ``damping`` is alpha, the decay rate of the momentum
+    ``end_seen`` is False if the record ends during the flight.  ``damping`` is alpha, the decay rate of the momentum
     [1/time].  ``gravity`` is the acceleration taken as gravity: 0 if there is none, NaN if nothing but its constancy
     shows it, infinite if energies grow under a load of unknown size [length/time^2].
     """

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Smallest number of states from which a load, gravity and damping can be separated, twice the number of unknowns.
+# Smallest number of states from which a load, gravity and damping can be separated.
+# This is twice the number of unknowns.
 FEWEST_STATES: Final = 6
 # Relative error of the work of gravity, caused by sampling and by the sums of the solver.
 # A contact changes the work by more than the relative error of the work of gravity.
@@ -38,8 +39,8 @@ _OF_INTERNAL: Final = 0.1
 # Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# _LITTLE: losses of kinetic energy below this share are ignored [-].
-# _MUCH: losses of kinetic energy above this share are due to friction, not damping [-].
+# _LITTLE: losses of kinetic energy below this share of it are ignored [-].
+# _MUCH: losses of kinetic energy above this share of it are due to friction, not damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
 # Relative error of the damped energy if it is computed from the damping rate of the vibration.
@@ -163,7 +164,7 @@ def compute_change_of_balance(
 
 @remember
 def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
-    """Return the laws of the energies in free flight, without and with a vibration of the internal energy."""
+    """Return two laws of the energies in free flight; the second allows for a vibration of the internal energy."""
     terms = np.stack(_list_terms(balance), axis=1)
     return (
         _Parabola(balance.time, terms, balance.kinetic, None),

@@ -39,7 +39,7 @@ _QUANTITIES: Final[Mapping[str, str]] = {
 }
 # Names of a total energy of Abaqus: the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
-# Quantities of which at least one is needed to judge the health of a run.
+# The health of a run can be judged if at least one of these quantities is written.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
     "kinetic_energy",
     "frictional_contact_energy",
@@ -109,7 +109,8 @@ def read_momentum(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = float("nan")  # The mass is unknown, or nothing moves.
+    # The mass is unknown if no file contains it, or if nothing moves.
+    mass = float("nan")
     if columns.momentum:
         mass = columns.mass(values) or mass
     return Momenta(
@@ -181,7 +182,7 @@ class _Columns:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        # True if a momentum is read in place of the velocity.
+        # True if the momentum of the model is read, because its velocity is not written.
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Largest force, or change of an impulse, that is treated as zero, as a share of the largest one.
+# Forces, and changes of an impulse, below this share of the largest value are treated as zero [-].
 # Single precision has seven digits, so smaller values are rounding errors.
 _NOTHING: Final = 1e-6
 
@@ -68,7 +68,7 @@ class ContactForce(NamedTuple):
 
     @property
     def times(self) -> tuple[tuple[float, float], ...]:
-        """Intervals (start, end) in which the force acts: from the last state without force to the next one."""
+        """Intervals (start, end) in which the force acts, each between two states in which no force acts."""
         return tuple(
             (
                 float(self.time[max(interval.start - 1, 0)]),

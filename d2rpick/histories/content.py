@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # size of the largest file that is kept in memory [bytes]
-_LINES: Final = 1 << 16  # number of bytes in which line ends are counted at a time
+_HELD: Final = 1 << 24  # Files up to this size are kept in memory [bytes].
+_LINES: Final = 1 << 16  # Line ends are counted in pieces of this number of bytes.
 # Number of bytes at each end of a file that are compared to recognise the file after it has grown.
 _END: Final = 1 << 12
 
@@ -82,7 +82,7 @@ class Content:
         return self[end : end + size_after]
 
     def check(self) -> None:
-        """Do nothing: bytes in memory do not change."""
+        """Do nothing, because bytes in memory do not change."""
 
 
 def make_content(data: bytes | Content) -> Content:
@@ -170,7 +170,7 @@ class OnDisk(Content):
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Return the bytes between two offsets, shape (end - begin,), valid until the next call in this thread."""
+        """Return the bytes between two offsets, shape (end - begin,). The next call in this thread overwrites them."""
         data = self._room(end - begin)
         self._fill(data.data, begin)
         return data
@@ -297,7 +297,7 @@ class Scattered(OnDisk):
         return local()
 
     def __del__(self) -> None:
-        """Do nothing: no file is open."""
+        """Do nothing, because no file is open."""
 
     def __bytes__(self) -> bytes:
         data = self.view(0, self._size).tobytes()

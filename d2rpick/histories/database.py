@@ -144,7 +144,7 @@ class Database:
 
     @property
     def energy_channel(self) -> str | None:
-        """Name of the internal energy of the whole model; None if there is none."""
+        """Name of the internal energy of the model; None if the file does not contain this energy."""
         for name in ("internal energy", "internal_energy"):
             if name in self.channels:
                 return name
@@ -177,9 +177,9 @@ class Legs:
         named: Sequence[tuple[str, str]] = (),
         notes: Sequence[str] = (),
     ) -> None:
-        self._cut = cut  # names of packed files that are truncated
-        self._own_notes = notes  # notes on files that were not read
-        self._named = named  # quantities whose channels have unusual names
+        self._cut = cut  # Names of packed files that are truncated.
+        self._own_notes = notes  # Notes on files that were not read.
+        self._named = named  # Quantities whose channels have unusual names.
         self._files = self._legs = [*legs]
         if len(legs) > 1:  # The times of a single restart segment may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
@@ -411,7 +411,7 @@ def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the number of decimals of a precision; if there is none, its number of significant digits."""
+    """Return the number of decimals of a precision, or its number of significant digits if decimals are unknown."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
@@ -426,7 +426,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    # Output intervals are usually regular, so that no gap has to be searched for.
+    # Output intervals are usually regular, so that there is no gap to find.
     if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)

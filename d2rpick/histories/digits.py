@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-_DIGITS: Final = 6  # number of significant digits of a printed time
-# Number of significant digits kept in a sum of times: more than files have, fewer than a double has.
+_DIGITS: Final = 6  # Number of significant digits with which times are printed.
+# A sum of times keeps this number of significant digits, more than files have and fewer than a double has.
 _EXACT: Final = 12
 
 # Sizes of the units of time by their names [s], as strings because 0.001 is not exact as a double.
@@ -244,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # us is tried first: if both units fit, the value in ms would be too early in the record.
+    # The unit us is tried first, because a value in ms would lie too early in the record if both units fit.
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:

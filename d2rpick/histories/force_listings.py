@@ -37,7 +37,7 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-# number of bytes at the start of a file that contain its complete legend
+# Number of bytes at the start of a file that contain its complete legend.
 _HEAD: Final = 1 << 16
 
 

@@ -106,7 +106,7 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Return the same momenta with another choice of parts to switch; stored results are kept."""
+        """Return the momenta with another choice of parts to switch; stored results are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(copy, "memory", self.memory)
         return copy
@@ -321,7 +321,7 @@ class History:
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, and then of the whole model, if they are known."""
+        """Known momenta: first those of the parts, then that of the whole model."""
         return self.evidence.momenta
 
     def find_momenta(self, *, of_parts: bool) -> Momenta | None:
@@ -338,7 +338,7 @@ class History:
 
     @property
     def balance(self) -> Balance | None:
-        """Energies of the whole model, as far as the files contain them."""
+        """Energies of the whole model that the files contain."""
         return self.evidence.balance
 
     @property
@@ -490,7 +490,7 @@ def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]
 def select_states(
     record: Record, states: slice | NDArray[np.bool_ | np.intp]
 ) -> Record:
-    """Return a record with only the selected states. Part masses stay the same, because they do not depend on time."""
+    """Return a record with only the selected states. Part masses do not change, because they do not depend on time."""
     columns = list_columns(record)
     rows: dict[str, Any] = {name: values[states] for name, values in columns.items()}
     return replace(record, **rows)

@@ -197,7 +197,7 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that mean only an internal energy; else of all names that mention one.
+    """Return the indices of names that mean exactly an internal energy, or else of all names that mention one.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -217,7 +217,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
 
 
 def find_quantity(name: str) -> str | None:
-    """Return the quantity of the whole model in `QUANTITIES` that a name means, None for any other name.
+    """Return the quantity of the whole model in `QUANTITIES` that a name means, any other name gives None.
 
     Examples
     --------
@@ -271,7 +271,7 @@ def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _is_bare_total(name: str) -> bool:
-    """Return True if a name is "total", with or without a word for energy."""
+    """Return True if a name is "total", possibly with a word for energy."""
     words = _split_words(name.rpartition("/")[2])
     words = [word for word in words if word not in _ENERGY_WORDS]
     return words == ["total"]

@@ -86,7 +86,7 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
-# smallest number of letters by which the beginning of a name identifies it
+# A name is identified by its beginning only if this has at least this number of letters.
 _SHORTEST_BEGINNING: Final = 3
 # Pattern of a number or range of part ids; a string with more digits is a title.
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
@@ -114,7 +114,7 @@ def find_unit(name: str) -> str:
 
 
 def find_energy_unit(name: str) -> str:
-    """Return the unit at the end of the name of an energy; empty if it has none, or one that is no energy.
+    """Return the unit at the end of the name of an energy; empty if the name has no unit, or no unit of energy.
 
     Examples
     --------

@@ -43,7 +43,7 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # Upper limit for the length of the legend of an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
-# Largest number of unused tables that a note names.
+# A note names at most this number of unused tables.
 _MOST_TABLES: Final = 3
 # Characters at the end of the name of a later file of a family.
 _DIGITS: Final = "0123456789"
@@ -248,7 +248,7 @@ def _sort_forces_last(
     """Return the formats; formats that contain only forces come last. Raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
-        # Reading the branch raises the error with the best message about missing data
+        # Reading the branch raises the error with the best message about missing data.
         opened[ordered[0]][0].branch("glstat")
     return sorted(ordered, key=alone.__getitem__)
 
@@ -263,7 +263,7 @@ def _is_force_listing(source: Source) -> bool:
 def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
-    """Read the forces of files without energies; return a note instead if they cannot be read."""
+    """Read the forces of files that contain no energies; return a note instead if they cannot be read."""
     try:
         return force_listings.read_listed_forces(sources), ()
     except FormatError as error:

@@ -82,7 +82,7 @@ class OpenedRun:
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> OpenedRun:
-        """Return the same run with other external forces on its parts (``surroundings``)."""
+        """Return the run with other external forces on its parts (``surroundings``)."""
         return OpenedRun(
             self.sources,
             self.databases,
@@ -287,7 +287,7 @@ class OpenedRun:
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Parts that are springs or dampers, as far as their energies show."""
+        """Parts that are springs or dampers according to their energies."""
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
@@ -334,7 +334,7 @@ class OpenedRun:
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
-        """Return the history of the selected energy, without other data that show flights."""
+        """Return the history of the selected energy only; other data that show flights are left out."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
@@ -402,7 +402,7 @@ class OpenedRun:
         return replace(history, springs=tuple(compress(chosen, left_out)))
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the whole model without the energy of springs and dampers, if there is other energy."""
+        """Return the history of the model; the energy of springs and dampers is left out if there is other energy."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -455,7 +455,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # A database without channels raises the error with the best message about missing channels.
+                    # A database that has no channels raises the error with the best message about missing channels.
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
@@ -487,7 +487,7 @@ class OpenedRun:
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
-    """Return the unit of energy of all these channels; empty if one has none, or they differ."""
+    """Return the unit of energy of all these channels; empty if a channel has no unit, or if the units differ."""
     units = {database.find_energy_unit(name) for name in names}
     return units.pop() if len(units) == 1 else ""
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Smallest share of states that repeat the previous time in a table with a row for each part.
 _REPEATED: Final = 0.49
-# Smallest number of times that is examined; with fewer, equal times in several rows may be a coincidence.
+# Smallest number of times that is examined; equal times of fewer rows may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of output intervals before and after a restart; other curves and unsorted tables exceed it.
 _ALIKE = 2.0
@@ -295,7 +295,7 @@ def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, .
 def find_first_above(
     values: Samples, start: NDArray[np.intp], limit: Samples
 ) -> NDArray[np.intp]:
-    """For each ``start``, return the index of the first of values (n,) from there on above its ``limit``, (m,).
+    """For each ``start``, return the index (m,) of the first of values (n,) after it that exceeds its ``limit``.
 
     The index is n if there is none. The search takes O((n + m) log n).
 

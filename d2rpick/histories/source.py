@@ -87,7 +87,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If a file cannot be read, or one of several was replaced or cut meanwhile, so that they may be of two runs.
     """
     files = expand(names)
-    families = _open_families(files)  # The files of a family are checked at each read
+    families = _open_families(files)  # The files of a family are checked at each read.
     states_before = {
         name: _look_at_state(name) for name in files if name not in families
     }
@@ -129,7 +129,7 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
 
 
 def _look_at_state(name: str) -> FileState | None:
-    """Return the state of a regular file; None for any other kind of file."""
+    """Return the state of a file, or None if it is not a regular file."""
     try:
         status = os.stat(name)  # noqa: PTH116  pathlib would slow down start-up
     except (OSError, ValueError):
@@ -343,7 +343,7 @@ def _unpack_pieces(
 
     pieces: list[bytes] = []
     size = 0
-    unpacker = zlib.decompressobj(wbits=31)  # The value 31 selects the gzip format
+    unpacker = zlib.decompressobj(wbits=31)  # The value 31 selects the gzip format.
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         unread = packed[end - _BLOCK : end]
         while unread:
@@ -384,6 +384,6 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 def _split_leg_number(name: str) -> tuple[str, int]:
     """Split a file name into its stem and the number of its restart segment, which is 0 if there is no number."""
     match = _NUMBERED.fullmatch(name)
-    # The match is never None, because the pattern matches any text
+    # The match is never None, because the pattern matches any text.
     assert match is not None
     return match[1], int(match[2] or 0)

@@ -24,7 +24,7 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
-    """External forces on each part (key: part id) and on the whole model (key: None).
+    """External forces on each part (the key is the part id) and on the whole model (the key is None).
 
     ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
     accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if
@@ -61,7 +61,7 @@ class Surroundings:
     def free(
         self, parts: Iterable[Part] | None, time: float
     ) -> tuple[float, float] | None:
-        """Return the interval around ``time`` without a support of these parts, or of the model; None if supported."""
+        """Return the interval around ``time`` in which no support holds these parts or the model; None if one does."""
         start, end = -inf, inf
         for support in self.supports_of(parts):
             if support.start <= time <= support.end:

@@ -30,7 +30,8 @@ from d2rpick.models.box_model import (
 # Stiffness of floor and curb at one point [N/m], lower than that of the box so that it does not limit the time step.
 # The weight of the box makes the box penetrate a floor of this stiffness by 0.5 mm.
 STIFFNESS = 5e5
-# Below this sliding speed, friction is proportional to the speed [m/s]. Typical sliding speeds are 100 times as high.
+# Below this sliding speed, friction is proportional to the speed [m/s].
+# Typical sliding speeds are 100 times as high.
 SLIP = 0.1
 # A point that is farther below the floor than this has left the sled and does not touch its floor [m].
 DEEPEST = 0.1
@@ -43,7 +44,7 @@ FASTEST, FALL = 4.0, 5.0
 # Contact forces that are less than this apart belong to the same contact [s], because corners rattle.
 SAME_CONTACT = 2e-3
 
-# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars without contact.
+# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars that touch nothing.
 _SAFETY = 0.9
 # A time that exceeds a whole number of time steps by less than this share of a step is rounded down [-].
 _SAME = 1e-6

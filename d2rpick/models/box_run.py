@@ -75,12 +75,12 @@ class Record(NamedTuple):
 
     @property
     def landed(self) -> float | None:
-        """Time of the first contact force of the ground [s]; None if there is none."""
+        """Time of the first contact force of the ground [s]; None if the box does not touch the ground."""
         return self.landings[0][0] if self.landings else None
 
     @property
     def total_energy(self) -> Values:
-        """Sum of current and dissipated energy (n,) [J], as in a solver, without the energy lost at tr."""
+        """Sum of current and dissipated energy (n,) [J], as in a solver, but excluding the energy lost at tr."""
         present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
             present + self.friction_energy + self.wall_energy + self.damping_energy

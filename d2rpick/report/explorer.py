@@ -70,7 +70,7 @@ _VALUES: Final[Mapping[str, str]] = {
 }
 # Number of columns into which the view is divided to draw windows of acceptable tr. It must be a multiple of 8.
 _COLUMNS: Final = 480
-# number of significant digits to which a difference is shown
+# Number of significant digits with which a difference is shown.
 _READ: Final = 3
 
 
@@ -317,7 +317,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 def _list_texts(
     offer: Offer, decision: Decision | None, start: Offer, unit: str
 ) -> dict[str, str | None]:
-    """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
+    """Return all texts shown for a td, worded like those of ``suggest --td``; unknown values give None."""
     best = offer.best
     return {
         "td": format_short(offer.td),

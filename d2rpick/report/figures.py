@@ -35,10 +35,10 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Colour of items without a verdict, such as admissible times and rigid windows of a finished run.
+# Colour of items that have no verdict, such as admissible times and rigid windows of a finished run.
 # Green, yellow and red are used for verdicts.
 NEUTRAL: Final = "#595959"
-# width of a figure in a file [inch]
+# Width of a figure in a file [inch].
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time, as a share of the axes; True stands for a page, False for a file.
 LABEL: Final = {False: 0.14, True: 0.28}
@@ -46,7 +46,7 @@ LABEL: Final = {False: 0.14, True: 0.28}
 _DECADES: Final = 100.0
 # Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
 STRETCHES: Final = 400
-# Longest name in a legend [letters]; a longer name from a file is shortened.
+# Largest number of letters of a name in a legend; a longer name from a file is shortened.
 _LONGEST_NAME = 28
 
 # Width of a figure on a page [inch], chosen so that its letters on a phone are as large as those of the text.
@@ -58,10 +58,10 @@ PAGE_WIDTH: Final = 4.5
 # _LINE: height of a line of the legend [inch].
 # _EDGE: space next to the name of the vertical axis [inch].
 _TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
-# height of the letters of an axis name [inch]
+# Height of the letters of an axis name [inch].
 _NAME: Final = 0.16
 _COLUMNS: Final = 2
-# largest number of labels on the time axis
+# Largest number of labels on the time axis.
 _NUMBERS: Final = 5
 
 
@@ -123,7 +123,7 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def ignore_missing_letters() -> Iterator[None]:
-    """Draw missing letters of the font as boxes, without a warning."""
+    """Draw letters that the font lacks as boxes, and suppress the warning about them."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
@@ -332,12 +332,12 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(
             content, metadata=nothing
-        )  # used because `Figure.savefig` draws a figure twice
+        )  # This function is used because `Figure.savefig` draws a figure twice.
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(
         r' (?:width|height)="[\d.]+pt"', "", element, count=2
-    )  # removed because the page sets the size
+    )  # The size is removed because the page sets it.
     # Coordinates are rounded to 0.01 points, which is finer than any screen.
     element = re.sub(
         r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element

@@ -82,7 +82,7 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # hatches that distinguish the windows without colour
+}  # Hatches distinguish the windows in print without colours.
 # _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
 # _PLAN_PANEL: height of the axes of that figure on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
@@ -98,7 +98,7 @@ _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
 # Space before the first td and after the last td, as a share of the axes, so that marks there are not cut off.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of one colour.
+# Palette of Okabe and Ito, except yellow, which is hard to see on white. Dashes distinguish lines of one colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,
@@ -109,21 +109,21 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Largest number of runs that are all drawn in colour with a name; if there are more, only the outliers are.
+# Up to this number of runs, all are drawn in colour with a name; of more runs, only the outliers are.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
 # _DARK: all grey curves together are at most as dark as this number of lines.
 # _FAINTEST: smallest opacity of a grey curve [-].
 _DARK, _FAINTEST = 10, 0.02
-# if there are more runs than this, their lines and marks are drawn thin
+# If there are more runs than this number, their lines and marks are drawn thin.
 _MANY: Final = 40
 # _BEFORE: time shown before the first tr, as a share of the time from the first tr to td.
 # _AFTER: time shown after td, as a share of the time from the first tr to td.
 _BEFORE, _AFTER = 0.25, 0.15
-# height of the figure of ``study`` in a file [inch]
+# Height of the figure of ``study`` in a file [inch].
 _HEIGHT: Final = 4.0
-# height of a run's name, as a share of the axes
+# Height of a run's name, as a share of the axes.
 _LINE: Final = 0.055
 # The line that connects a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
@@ -352,7 +352,7 @@ def _label_window(number: int, window: Times, span: float) -> str:
 def draw_run(
     history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
 ) -> Figure:
-    """Draw the energy of a run as far as it can be trusted, its flights, and the windows in which parts were rigid."""
+    """Draw the reliable part of the energy of a run, its flights, and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     rigid = np.any(
         [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
@@ -396,7 +396,7 @@ def _label_run_axes(history: History) -> tuple[str, str]:
 def _finish_run_axes(
     figure: Figure, axes: Axes, time_label: str, energy_label: str, *, page: bool
 ) -> None:
-    """Label the axes of a whole run, and put the legend below."""
+    """Label the axes of a complete run, and put the legend below."""
     axes.set(xlabel=time_label, ylabel=energy_label)
     figures.format_axes(axes, legend=False)
     if page:
@@ -533,7 +533,7 @@ def _choose_named_runs(
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
-    """Draw the runs without a name in grey, and the more faintly the more runs there are."""
+    """Draw the runs that have no name in grey, and the more faintly the more runs there are."""
     named_curves = {id(named_run.curve) for named_run in named_runs}
     other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
     is_thin = len(curves) > _MANY

@@ -27,7 +27,7 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
 
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
-    """Draw the residual of each tr in the flight, and the residual of a release without any vibration."""
+    """Draw the residual of each tr in the flight, and the residual of a run that does not vibrate after td."""
     profile = situation.vibration.profile
     start = situation.earliest_tr
     assert profile is not None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# number of outlines of the rolling box that are drawn, few enough to be distinguishable
+# Number of outlines of the rolling box, few enough to be distinguishable.
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6

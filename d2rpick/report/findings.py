@@ -49,8 +49,9 @@ _NOUNS: Final = (
     "error",
     "warning",
     "info message",
-)  # nouns for the severities: error, warning, info
-_NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled only when it is used
+)  # Nouns for the severities error, warning and info.
+# This pattern is compiled at its first use, to keep start-up fast.
+_NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 _LINE: Final = get_kind("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
@@ -480,7 +481,7 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display, with ``/`` and without undecodable bytes, relative to ``root`` if it is inside it."""
+    """Return a path for display, with ``/`` and no undecodable bytes, relative to ``root`` if it is inside it."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up

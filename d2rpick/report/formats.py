@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-# largest width of text [columns], because longer lines are hard to read
+# Largest width of text [columns], because longer lines are hard to read.
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")
@@ -58,7 +58,7 @@ class DisplayOptions(NamedTuple):
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
-    """Write an answer in one of its forms: JSON with the ``DOCUMENT`` of its module, others with its ``as_FORM``.
+    """Write an answer in one of its forms: JSON with the ``DOCUMENT`` of its module, other forms with its ``as_FORM``.
 
     Examples
     --------

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Table = dict[str, "Samples"]
 
-TABLES: Final = ("csv", "hdf5")  # formats that hold columns with any names
+TABLES: Final = ("csv", "hdf5")  # Formats that hold columns with any names.
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 

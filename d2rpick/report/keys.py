@@ -109,7 +109,7 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Deprecated keys of single parts, which remain without values for one version because users may read them.
+# Deprecated keys of single parts, which are null for one version before they are removed, as users may read them.
 _NO_VALUE: Final = Kind({"type": "null"})
 NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
                         "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
@@ -199,7 +199,7 @@ LATER: Final = (
 )
 GRADE: Final = maybe(one_of("good", "fair", "poor"))
 VERDICT: Final = one_of(USE, USE_WITH_CARE, DO_NOT_USE)
-# values of the decision on a pair
+# JSON fields of the decision on a pair.
 DECIDED: Final = row(
     Field("verdict", VERDICT, "what to do with the pair"),
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda decision: decision.reason),
@@ -209,7 +209,7 @@ DECIDED: Final = row(
     Field("worst_residual", get_kind("number", minimum=0),
           "worst possible residual; 2 if the residual is unknown"),
 )  # fmt: skip
-# values of the decision on a pair, for a result that may have no decision
+# JSON fields of the decision on a pair, for a result that may have no decision.
 DECISION: Final = tuple(
     field._replace(kind=maybe(field.kind), later=True)
     for field in DECIDED.of_part(lambda answer: answer.decision)
@@ -354,7 +354,7 @@ def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 
 
-# values of a situation at td
+# JSON fields of a situation at td.
 MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),

@@ -92,9 +92,10 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
 ))  # fmt: skip
-_MOST_TIMES: Final = 4  # largest number of times listed for a contact that acts often
+# At most this number of times is listed for a contact that acts often.
+_MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
-# keys of the JSON output whose value is a single value, neither a list nor an object
+# Keys of the JSON output whose value is neither a list nor an object.
 _PLAIN = (
     "format",
     "version",

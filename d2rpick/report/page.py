@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# smallest number of sections with which a page has a table of contents
+# A page with at least this number of sections has a table of contents.
 _LONG: Final = 4
-# largest number of columns of a table that fits on a narrow screen
+# A table with at most this number of columns fits on a narrow screen.
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
@@ -45,12 +45,12 @@ _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
-_MOST_FILES: Final = 20  # largest number of files of a deck that are named
-# labels of the lines on a page that the reader fills in by hand
+_MOST_FILES: Final = 20  # A page names at most this number of files of a deck.
+# Labels of the lines on a page that the reader fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
-# CSS class of the card and the badge of each verdict
+# CSS class of the card and the badge of each verdict.
 CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
@@ -205,7 +205,7 @@ def build_drawing(caption: str, svg: str) -> Markup:
 
 
 def build_remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """Return a list of reasons and warnings; nothing if there are none."""
+    """Return a list of reasons and warnings, or nothing if both are missing."""
     lines = [make_element("li", reason) for reason in reasons]
     lines += [
         make_element("li", make_element("b", caution.code), f": {caution.message}")
@@ -244,7 +244,7 @@ def build_scrolling_table(
 def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Return a table without a box, in which the row ``marked`` is highlighted.
+    """Return a table that is not in a box, and in which the row ``marked`` is highlighted.
 
     Columns of numbers are right-aligned.  Lines break only at blanks, never within a number.
     """
@@ -285,7 +285,7 @@ def _build_cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
 
 
 def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Return a list of names and descriptions; nothing if there are none."""
+    """Return a list of names and descriptions, or nothing if it would be empty."""
     listed = [
         make_element("div", make_element("dt", name), make_element("dd", text))
         for name, text in rows

@@ -64,7 +64,7 @@ _MOST_ROWS = 20
 
 # Largest number of rows of a table in a notebook.
 _FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # largest width of a picture in a notebook
+_WIDEST: Final = "max-width: 40em"  # Largest width of a picture in a notebook.
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
@@ -107,7 +107,7 @@ def _draw_suggestion(answer: PairSuggestion) -> Markup:
 def _build_starred_table(
     title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> Markup:
-    """Return a table without its column of stars; the recommended row, which has the star, is highlighted instead."""
+    """Remove the column of stars from a table, and highlight the recommended row, which has the star."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
@@ -413,7 +413,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
-    """Return the common results of the runs, without those on the card of the common tr."""
+    """Return the common results of the runs, except those on the card of the common tr."""
     outcome = study.list_outcome(answer)
     return outcome if answer.common.tr is None else outcome[1:]
 
@@ -661,7 +661,7 @@ def summarise_files(run: OpenedRun) -> str:
 
 
 def show_at_a_glance(kind: str, answer: Any, figure: Figure | None) -> str:
-    """Return an answer, or the overview of a run, as HTML for a notebook, without columns of unknown values."""
+    """Return an answer, or the overview of a run, as HTML for a notebook; columns of unknown values are left out."""
     give_sentences, table = _LOOKS[kind]
     lines = [
         make_element("div", make_element("b", name), f" {text}")

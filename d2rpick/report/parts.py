@@ -342,7 +342,7 @@ def _format_position_error(part_set: PartSet) -> str:
 
 
 def _format_lower_bound(part_set: PartSet, value: float | None) -> str:
-    """Return an error as text, with ">=" if it is only a lower limit; "unknown" for None."""
+    """Return an error as text, with ">=" if it is only a lower limit; "unknown" if it is None."""
     if value is None:
         return "unknown"
     sign = ">= " if part_set.position_is_lower_bound else ""

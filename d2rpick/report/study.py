@@ -303,7 +303,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return why the runs' pairs are not better, and how to improve them, without duplicates."""
+    """Return why the runs' pairs are not better, and how to improve them; each reason occurs once."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -328,7 +328,7 @@ def describe_td(answer: StudyOfRuns) -> str:
 
 
 def shorten_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Return the distinctive part of each name, without the folders and file names common to all.
+    """Return the distinctive part of each name; the folders and file names common to all are left out.
 
     Examples
     --------

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions
 
-# largest number of windows of acceptable tr that are listed in a line of text
+# A line of text lists at most this number of windows of acceptable tr.
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
-# a candidate and the decision on it
+# A candidate and the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
     keys.NO_PARTS,
@@ -137,7 +137,7 @@ def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
 def _select_shown_candidates(
     answer: PairSuggestion, display: DisplayOptions
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the first candidates, without empty columns."""
+    """Return the first candidates; empty columns are left out."""
     head, rows = tables.select_known_columns(
         *build_candidate_table(answer, display.limit)
     )
@@ -257,7 +257,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_position_error(best: Candidate, *, deck: bool) -> str:
-    """Return the position error of a body at td, its cause, and its assumptions, with or without a ``deck``."""
+    """Return the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` shows which do)" if taken and not deck else ""

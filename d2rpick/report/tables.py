@@ -67,7 +67,7 @@ def format_half_width(low: float | None, high: float | None) -> str | None:
 def select_known_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Leave out the columns without a known value.
+    """Leave out the columns in which no value is known.
 
     Examples
     --------

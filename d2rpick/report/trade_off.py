@@ -43,7 +43,7 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# columns of the CSV output and of a data frame
+# Columns of the CSV output and of a data frame.
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
@@ -51,7 +51,7 @@ COLUMNS: Final = [
 
 # A smaller relative change of the rigid time is not mentioned.
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share between these limits is described as halved; for a smaller share it is given [-].
+# An error that falls to a share between these limits is described as halved; a smaller share is given as a number [-].
 _HALF: Final = (0.45, 0.5)
 
 
@@ -146,7 +146,7 @@ def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
 def _list_choice_if_td_is_free(
     trade_off: TradeOff, requested: Offer
 ) -> list[tuple[str, str]]:
-    """Return the pair that ``suggest`` chooses in the range, unless it is the one at the requested td."""
+    """Return the pair that ``suggest`` chooses in the range, unless this is the pair at the requested td."""
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
@@ -218,7 +218,7 @@ def give_answer(trade_off: TradeOff) -> str:
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
-    """Describe what the next better td changes, or that there is none."""
+    """Describe what the next better td changes, or say that no td is better."""
     step = trade_off.step
     if step is None:
         small = requested.error is not None and requested.error <= EQUALLY_GOOD

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions
 
-# fields of the judged pair, its measures and the verdict
+# Fields of the judged pair, its measures and the verdict.
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),

@@ -28,7 +28,7 @@ BELOW_LEVEL = 100.0
 _ROOM = 0.08
 # Share of a flight at each of its ends that is ignored, because the load or the landing may still act there.
 _UNSURE = 0.01
-# number of points of a curve: a few dozen per oscillation cycle
+# Number of points of a curve, which gives a few dozen per oscillation cycle.
 _POINTS = 2000
 
 
@@ -46,7 +46,7 @@ class View(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Lowest and highest visible value of an axis, with some room [energy]; ``logarithmic`` gives its kind."""
+    """Lowest and highest visible value of an axis, with a margin [energy]; ``logarithmic`` gives the axis's kind."""
 
     low: float
     high: float
@@ -157,14 +157,14 @@ def make_view(
 def _read_flight_energies(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
-    """Return the energies in the flight without its ends, or the adjacent states if the flight contains none."""
+    """Return the energies in the flight except near its ends, or those of adjacent states if the flight has none."""
     margin = _UNSURE * (end - start)
     flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))
 
 
 class ReplayedMotion(NamedTuple):
-    """Deformation in one shape over ``time`` [time], without switching and ``switched`` [square root of energy]."""
+    """Deformation over ``time`` [time] in the reference run and in the ``switched`` run [square root of energy]."""
 
     time: Samples
     reference: Samples

@@ -119,7 +119,7 @@ class Configuration(NamedTuple):
 
 
 def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
-    """Return the part of an error message that says which rule ids exist, and a similar one if there is one."""
+    """Return the part of an error message that names the existing rule ids, and a similar rule id if there is any."""
     import difflib
 
     wanted = name.upper()
@@ -204,7 +204,7 @@ class CheckedWindow(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """Return the part id; None for a part set or rigid body whose parts are unknown."""
+        """Return the part id, or None if the unit is a part set or rigid body whose parts are unknown."""
         return self.unit.part
 
 
@@ -406,7 +406,7 @@ def _read_case(
 
 
 def _list_remarks(deck: Deck) -> Iterator[str]:
-    """Yield remarks on comments that ignore rules that do not exist."""
+    """Yield remarks on comments that try to silence a rule that does not exist."""
     for card in deck.silencing:
         for name in card.block.silenced:
             if not (

@@ -443,7 +443,7 @@ class RunCase(Case):
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return the parts of elements without a co-rotational frame, with the formulation."""
+        """Return the parts whose elements have no co-rotational frame, with the formulation."""
         return self.run.starter.unturned if self.run.starter else {}
 
     @cached_property

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
 # For each CODE: what exerts the force, and True if the set waits for the force, False if for its end.
 _CODES: Final = {
@@ -34,14 +34,14 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-# smallest TIME2 that means that a set has no latest switching time
+# Smallest TIME2 that means that a set has no latest switching time.
 _NEVER: Final = 1e20
-# Largest length of a window that is chatter and not a flight, as a fraction of the longest window.
+# A window up to this share of the longest window is chatter and not a flight [-].
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by a force, or a pair of them: its windows in the history, and the spans of the contact force [time].
+    """A switch, or a pair of switches, by a force: its windows in the history, and the spans of the force [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
     time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
@@ -56,7 +56,7 @@ class Forced(NamedTuple):
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Return the windows of the switched parts in ascending order, without duplicates."""
+        """Return the windows of the switched parts in ascending order; each window occurs once."""
         return sorted(
             {(window.tr, window.td) for window in self.windows},
             key=lambda pair: pair[0],

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import SwitchHeader
     from d2rpick.rules.judgement import HistoryJudge
 
-    Spans = tuple[tuple[float, float], ...]  # start and end of each time span [time]
+    Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
 
 class Sensed(NamedTuple):

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of the warnings of ``verify`` that the check repeats, because no rule reports the same.
+# Codes of the warnings of ``verify`` that the check repeats, because no rule reports these problems.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -244,7 +244,7 @@ class HistoryJudge:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy have no locked-in energy, which a note reports; only the flight limits their times.
+            # Parts that have no energy lock in no energy, which a note reports; only the flight limits their times.
             is_flight_known = verdict.situation.flight.start is not None
             return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
         for caution in verdict.cautions:
@@ -307,7 +307,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
 def _judge_open_window(
     history: History, tr: float, settings: Settings
 ) -> Iterator[Fault]:
-    """Object to a tr without td that lies neither in the last flight of the history nor in a flight around tr."""
+    """Object to a tr that has no td, unless it lies in the last flight of the history or in a flight around tr."""
     last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
@@ -352,7 +352,7 @@ def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
     situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        # Without a vibration the energy at any tr equals the energy at td, apart from rounding.
+        # If nothing vibrates, the energy at any tr equals the energy at td, apart from rounding.
         return
     if candidate.sign_match is False:
         quantity = "the deformations at tr and td have opposite directions"

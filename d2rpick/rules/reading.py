@@ -453,7 +453,7 @@ def _describe_course(sensed: Sensed) -> str:
 
 
 def _describe_trigger(card: SwitchSet) -> str:
-    """Return the trigger of a switching card without a time; empty for other cards, and if it has no effect."""
+    """Return the trigger of a switching card that has no time; empty for other cards and ineffective triggers."""
     if card.restart:
         return ""
     if card.kind == "restart":

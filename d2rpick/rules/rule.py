@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # file name of an example deck that is given no other name
+MAIN_DECK: Final = "main.k"  # File name of an example deck that is given no other name.
 
 HEAD = """\
 *KEYWORD

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # Largest time step as a fraction of the rigid window, because parts are released up to one time step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # largest number of main nodes that a message lists
+_MOST_LISTED = 8  # A message lists at most this number of main nodes.
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import CardField
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # largest number of part ids that a message suggests for an unknown id
+_NEAREST = 3  # A message suggests at most this number of part ids for an unknown id.
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -36,7 +36,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-_DELETED = 1  # value of NRBF and NCSF with which a card deletes constraints
+_DELETED = 1  # Value of NRBF and NCSF with which a card deletes constraints.
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
@@ -360,7 +360,7 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
 
 
 def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
-    """Yield constraints on parts that cards make rigid without deleting the constraints."""
+    """Yield constraints on parts if a card makes the parts rigid and does not delete the constraints."""
     switched = _find_left_active(case, nodal=nodal)
     constraints = [
         constraint
@@ -429,7 +429,7 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 
 
 def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Return, by part id, the flags of the first card that makes the part rigid without deleting constraints."""
+    """Return, by part id, the flags of the first card that makes the part rigid and keeps its constraints."""
     first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
         flags = _find_flags(case, event.by)

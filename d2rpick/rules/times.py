@@ -44,12 +44,13 @@ _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-_FEW = 2  # largest number of cards with which D2R102 and D2R105 would report the same mistake
+# D2R102 and D2R105 would report one mistake twice if a deck has at most this number of cards.
+_FEW = 2
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
-_DECADES = 3.0  # number of powers of ten between two adjacent units of time
+_DECADES = 3.0  # Number of powers of ten between two adjacent units of time.
 # Tolerance for the ratio of end times, as a power of ten; a reference run may end at half of the time.
 _NEAR = math.log10(2)
 _HISTORY: Final = (

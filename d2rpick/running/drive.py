@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches its parts by itself, one leg (engine run) after the other."""
+"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after the other."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed; before the first leg, how many ``seconds`` the starter has run."""
+        """Describe the leg that is being computed, or how many ``seconds`` the starter has run before the first leg."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
@@ -334,7 +334,7 @@ class Observer:
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
-        # Flights that were slightly too short to be switched.
+        # These flights were slightly too short to be switched.
         short_flights = tuple(
             (start, end)
             for start, end in self._evidence.pauses(order.start)
@@ -380,7 +380,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, without the legs that were undone by a restart from an earlier time."""
+        """Computed legs, except the legs that were undone by a restart from an earlier time."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":

@@ -167,7 +167,7 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
-        self._signal = 0  # number of the signal that ended the last process, or 0
+        self._signal = 0  # Number of the signal that ended the last process, or 0.
 
     def file(self, number: int, suffix: str) -> Path:
         """Return the path of a file of a leg; leg 0 is the starter."""
@@ -274,7 +274,7 @@ class Solver:
         return True
 
     def read_times(self, number: int) -> Samples:
-        """Return the times of the states in the history of a leg [time]; none if it cannot be read."""
+        """Return the times of the states in the history of a leg [time]; none if the history cannot be read."""
         path = self.history(number)
         try:
             return TimeHistory(path.read_bytes(), str(path)).time

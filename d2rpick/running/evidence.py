@@ -37,7 +37,7 @@ _GRAVITY_STATES: Final = 1000
 
 
 class GrowingEvidence:
-    """Finds the time without force, and the flights, of the parts of a growing record.
+    """Finds the force-free time and the flights of the parts of a growing record.
 
     ``given``, ``of_deck`` and ``before`` are those of its inner ``motion``.
     """
@@ -114,7 +114,7 @@ class GrowingEvidence:
         for members in dict.fromkeys(_list_sets(momenta)):
             columns = _make_columns(momenta.time, momenta.of(members), balance)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
-            # Once other parts move, it shows their contacts too and is no longer used.
+            # Once other parts move, the contact energy includes their contacts and is no longer used.
             other_parts = sorted({*range(len(momenta.parts))} - {*members})
             columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
             parts = tuple(momenta.parts[number] for number in members)
@@ -236,7 +236,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
-    """Return a flight whose evidence ended at ``last_time``, with the end of the flight that other evidence shows."""
+    """Return a flight that its own data show up to ``last_time``, with the end that other data show."""
     if flight.end is not None:
         return flight
     ends = (
@@ -249,7 +249,7 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
 
 
 def _is_of_model(witness: GrowingWitness) -> bool:
-    """Return True for evidence of the whole model, which is used after the evidence of parts."""
+    """Return True if the evidence concerns the model; such evidence is used after the evidence of parts."""
     return witness.parts is None
 
 

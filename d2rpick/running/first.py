@@ -53,7 +53,7 @@ _MOST_LEGS: Final = 9
 _STEPS_PER_WAIT: Final = 300
 # In LS-DYNA, contacts are ignored after a switch for the required force-free time divided by this number.
 _DELAYS_PER_WAIT: Final = 100
-# Radioss keywords of loads that act without a contact.
+# Radioss keywords of loads that are no contact forces.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
 _OF_ALL: Final = (
@@ -75,7 +75,7 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
-# _PUSHES: prefixes of the LS-DYNA keywords of loads that act without a contact.
+# _PUSHES: prefixes of the LS-DYNA keywords of loads that are no contact forces.
 # _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 # Gap in LS-DYNA at which the parts become deformable before a contact, as a multiple of the largest shell thickness.
@@ -148,7 +148,7 @@ def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     return of_deck._replace(time=float(f"{of_deck.time:.3g}"))
 
 
-# Radioss.
+# The functions below write the cards of Radioss.
 
 
 def _make_radioss_card(
@@ -246,7 +246,7 @@ def _explain_wait(wait: Wait) -> str:
     return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 
-# LS-DYNA.
+# The functions below write the cards of LS-DYNA.
 
 
 def _make_ls_dyna_card(

@@ -82,7 +82,8 @@ class _Motion:
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
-        self.has_free_swing = False  # True once an oscillation without a push was seen
+        # The value is True once an unforced oscillation was seen.
+        self.has_free_swing = False
         # The first half period has no duration; it ends when the motion is first seen.
         self._swings: list[_HalfPeriod] = []
         # The columns are time, value, and the smallest change that is an oscillation.
@@ -198,7 +199,7 @@ class InnerMotion:
     """The waiting time at each state of a record, from the inner motion up to that state.
 
     ``evidence`` shows which parts move, and since when no force has acted.
-    ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
+    ``given`` is the user's waiting time, ``of_deck`` the deck's, ``before`` that of earlier flights [time].
     """
 
     def __init__(
@@ -279,7 +280,7 @@ class InnerMotion:
     ) -> None:
         """Lengthen the waiting time if a completed half period requires it and was neither a rotation nor pushed.
 
-        A pushed swing counts if there is no deck and this motion has not swung without a push before.
+        A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """
         longest = so_far[-1]
         strongest = max(longest.strength, swing.strength)

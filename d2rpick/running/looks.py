@@ -108,7 +108,7 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in the files without an incomplete last state, and where to continue in them.
+        """Return the history in the files, except an incomplete last state, and where to continue in the files.
 
         The places are {} if the format of a file is always read as a whole.
         """
@@ -135,7 +135,7 @@ def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
 
 
 def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:
-    """Return a file without an incomplete last state."""
+    """Remove an incomplete last state from a file."""
     point = points.get(source.name)
     if point is None or point.end == len(source.data):
         return source

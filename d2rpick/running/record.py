@@ -113,12 +113,12 @@ def _join_tables(tables: Sequence[Any]) -> History:
 
 
 def hold_back_states(history: History) -> History:
-    """Return a history without its last state, if a later state with the same printed time may still replace it."""
+    """Remove the last state of a history, if a later state with the same printed time may still replace it."""
     return _join_tables([_drop_unsettled(table) for table in _list_tables(history)])
 
 
 def _drop_unsettled(table: Table) -> Table:
-    """Return a table without its last state if its last two times are as close as printed times can be."""
+    """Remove the last state of a table if its last two times are as close as printed times can be."""
     if isinstance(table, History):
         precision = table.time_precision
     else:
@@ -159,7 +159,7 @@ def skip_states(history: History, last_states: Sequence[Table]) -> History | Non
 
 
 def _contains(table: Table, state: int, last_state: Table) -> bool:
-    """Return True if a state of a table has the values of the last known state; ``state`` is -1 if there is none."""
+    """Return True if a state of a table has the values of the last known state; ``state`` may be -1 for no state."""
     columns, last_values = list_columns(table), list_columns(last_state)
     if state < 0 or columns.keys() != last_values.keys():
         return False

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 # RIGID: the parts are rigid, and the leg ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Two times are equal if they differ by less than this many output intervals, because a history may end one early.
+# Two times are equal if they differ by less than this number of output intervals.
+# A history may end one output interval early.
 _STATES: Final = 1.5
 # No further flight is switched once only this many leg numbers are left, so that the run can reach its end.
 _KEPT_BACK: Final = 10
@@ -99,7 +100,7 @@ class Order(NamedTuple):
         return self.kind in RIGID_KINDS
 
     def following(self, kind: str, until: float) -> Order:
-        """Return the order for a leg that continues from the end of this leg."""
+        """Return the order for a leg that begins at the end of this leg."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
@@ -146,7 +147,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed leg, with its ``cycles`` and CPU time ``cpu`` [s], None if its listing does not contain them."""
+    """A computed leg, with its ``cycles`` and CPU time ``cpu`` [s], which are None if its listing lacks them."""
 
     order: Order
     findings: LegFindings

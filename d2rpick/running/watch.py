@@ -68,7 +68,7 @@ class Watch:
         self._looks = Looks(*self._of_looks)
         self._begin_again()
         self._files: dict[str, WatchedFile] = {}
-        self._events: tuple[Event, ...] = ()  # events reported so far
+        self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
@@ -112,7 +112,7 @@ class Watch:
 
     @property
     def reads_what_is_new(self) -> bool:
-        """Return True if the next read covers the new states only."""
+        """Return True if the next read covers only the new states."""
         return self._looks.grow
 
     def state(self) -> Event:

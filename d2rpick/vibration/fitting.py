@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 
-# Numbers of free parameters of the three models: vibration, with plastic work, and with a preload.
+# Numbers of free parameters of the models: vibration, vibration with plastic work, vibration with preload.
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6
 
 # Numbers of exponentials in q**2 that the matrix-pencil method tries, one for each of the three models.
@@ -54,13 +54,13 @@ _NEAR: Final = 1e-6
 MAX_MISFIT: Final = 0.4
 # Safety factor on the largest variance of the misfit if only some of the samples are used [-].
 _FAR_TOO_MUCH: Final = 1.2
-# Largest number of start values that are refined, because the first may not be the best.
+# Largest number of start values that are refined, because the first value may not be the best.
 STARTS: Final = 3
 # No second start value is tried if the first one leaves less than this share of the variance unexplained [-].
 CERTAIN: Final = 0.01
 _MAX_STEPS: Final = 40
 # A fit to some of the samples is a drift, not a vibration, if it has less than 1/10 period in the record [rad].
-# None of 1,100 such fits became a vibration when it was refined with all samples.
+# None of 1,100 such fits became a vibration when the fit was refined with all samples.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
 # A parameter has no effect if the derivatives of the scaled energy with respect to it are smaller than this [-].
@@ -139,7 +139,7 @@ def _is_drift(parameters: Samples) -> bool:
 
 
 def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
-    """Return ``most`` evenly spaced samples; by default as many as for comparing starts."""
+    """Return ``most`` evenly spaced samples, by default the number used to compare start values."""
     stride = -(-s.size // most)
     return s[::stride], e[::stride]
 
@@ -166,7 +166,7 @@ def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) ->
 
 
 class Pencil(NamedTuple):
-    """Signal subspace of the exponentials in E, as singular vectors of its Hankel matrix of shape (lags, lags).
+    """Signal subspace of the exponentials in the energy: singular vectors of its Hankel matrix, shape (lags, lags).
 
     Matrix pencil (Hua and Sarkar, IEEE Trans.  ASSP 38, 1990): the leading right singular vectors of the Hankel matrix
     of equidistant values span the exponentials, and a shift by one cell multiplies each by exp(p h).  Means of an
@@ -178,7 +178,7 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Compute the singular vectors in descending order of their share of E."""
+        """Compute the singular vectors in descending order of their share of the energy."""
         running = integrate_by_trapezia(s, e)
         fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
@@ -215,7 +215,7 @@ def find_factors(vectors: Samples) -> NDArray[np.complex128]:
 
 
 def average_cells(s: Samples, running: Samples, count: int) -> Samples:
-    """Return means over equal cells of [0, 1], from the ``running`` integral over s."""
+    """Return the means of the energy over equal cells of [0, 1], from its ``running`` integral over s."""
     return np.asarray(
         np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count
     )

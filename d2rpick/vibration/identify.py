@@ -33,9 +33,9 @@ MIN_SAMPLES: Final = 24
 MIN_SAMPLES_PER_PERIOD: Final = 10
 # Largest growth -alpha t over the length t of the record [-]; noise may make a vibration seem to grow.
 MAX_GROWTH: Final = 0.3
-# Smallest plastic work as a share of the energy range [-]; it is negative only because of fitting errors.
+# Most negative plastic work, as a share of the energy range [-]; fitting errors may make it negative.
 MIN_PLASTIC: Final = -0.05
-# Largest misfit of a vibration without preload that is due to a stiffening spring [-].
+# A larger misfit of a vibration without preload is not attributed to a stiffening spring [-].
 MAX_OF_SPRING: Final = 0.1
 # Assumed hidden share of the vibration energy if a preload is replaced with a stiffening spring [-].
 _OF_A_PRELOAD: Final = 0.03
@@ -349,7 +349,7 @@ def _judge_attempt(
     e = record.e
     density = count_samples_per_period(
         s, attempt.scaled
-    )  # This comes first, because it needs as much memory as all later steps.
+    )  # This number is computed first, because its computation needs as much memory as all later steps.
     remainder = e - attempt.energy
     rms = float(np.sqrt(np.mean(remainder**2)))
     spread = float(np.std(e))
@@ -411,7 +411,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # This is the mean interval weighted by its length, so that gaps count more.
+    # Each interval is weighted by its length, so that gaps count more.
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
@@ -431,7 +431,7 @@ def _explain_implausible(
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
-        # 10 % finer than the limit, so that the value remains sufficient when rounded to two digits.
+        # The interval is 10 % finer than the limit, so that it suffices even if rounded to two digits.
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
         finding = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{finding}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"

@@ -29,7 +29,7 @@ _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
 # _CLEARLY_BETTER: more exponentials must reduce the prediction error to less than this share of it [-].
 # _PERFECT: with a smaller relative prediction error, more exponentials are not tried [-].
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
-# _BETTER: this share is used instead of _CLEARLY_BETTER if the misfit contains a line [-].
+# _BETTER: replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
 # _OF_A_LINE: the misfit contains a line if its largest power exceeds the mean power by this factor [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Share of the record that is fitted to predict the rest of the record [-].
@@ -237,7 +237,7 @@ class Prediction(NamedTuple):
 
 
 def predict(grid: Grid) -> Prediction | None:
-    """Find the lines, as many as best predict the energy; None if the record is too short or does not oscillate."""
+    """Find the spectral lines that best predict the energy; None if the record is too short or does not oscillate."""
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None

@@ -30,7 +30,7 @@ _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
 # A slowly oscillating deformation has energy at these multiples of its rate, like the force in a pendulum.
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
-# Two heights are treated as equal if the logarithm of their ratio is below this.
+# Two line heights are treated as equal if the logarithm of their ratio is below this [-].
 _SAME_HEIGHT: Final = 0.1
 # _STRONGEST: the search for harmonics is limited to this number of the strongest lines.
 # _HARMONICS: orders of the harmonics of these lines that are identified.

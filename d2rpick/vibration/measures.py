@@ -245,7 +245,7 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     )
     half = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # Times of zero velocity on both sides of tr, in columns. Between them q is monotone.
+    # Times of zero velocity on both sides of tr, in columns. Between these times q is monotone.
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))

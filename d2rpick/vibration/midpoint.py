@@ -115,12 +115,12 @@ class Reading:
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """Return the factor of the coherence that depends on tr, with a last axis for modes [energy]."""
+        """Return the factor in the coherence that depends on tr; the last axis counts the modes [energy]."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """Return the factor of the coherence that depends on td, with a last axis for modes [-]."""
+        """Return the factor in the coherence that depends on td; the last axis counts the modes [-]."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -144,6 +144,6 @@ class Reading:
         return np.asarray(np.sqrt(at_tr * at_td))
 
     def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return R^2 of pairs of times [-]."""
+        """Return the squared residual R^2 of pairs of times [-]."""
         lost = self.elastic_energy(tr) - 2 * self.overlap(tr, td)
         return np.maximum(1 + lost / self.vibration_energy(td), 0.0)

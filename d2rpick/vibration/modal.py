@@ -64,7 +64,7 @@ _MOST_MISSED: Final = 0.5
 # Largest misfit, relative to the range of the energy, with which a record is not refused [-].
 _MOST_MISFIT: Final = 0.3
 # _MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
-# _MOST_NEGATIVE_AT_ALL: limit of the same ratio if there is no better model [-].
+# _MOST_NEGATIVE_AT_ALL: limit that replaces _MOST_NEGATIVE if there is no better model [-].
 _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
 # Largest change of the static energy, relative to the mean vibration energy, with which a record is not refused [-].
 _MOST_DRIFT: Final = 0.6
@@ -73,7 +73,7 @@ _MOST_BEYOND: Final = 0.12
 # Largest size of harmonics, relative to their fundamental line, with which a record is not refused [-].
 _MOST_HARMONIC: Final = 0.05
 # _MOST_UNSTRETCHED: largest energy of a static deformation that the static energy lacks [-].
-# _MOST_UNSTRETCHED_AT_ALL: limit of the same energy if there is no better model [-].
+# _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
 # Smallest number of states per period of the fastest strong line with which a record is not refused.
 _FEWEST_PER_PERIOD: Final = 2.4
@@ -88,7 +88,7 @@ _FINER: Final = 4
 # _LITTLE_MISSED: largest prediction error of modes that show a flight, relative to the energy range [-].
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# _LEAST_HALF: half-width of the error band of R^2 before it is widened for known errors [-].
+# _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are not linear [-].
 # For a shell box, R deviated by 0.015 to 0.018 (rms) from the R of all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
@@ -109,7 +109,7 @@ _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # _BENT_ALIKE: effect on R^2 of the second harmonic of a stiffening spring, if both deformations are equal [-].
 # _BENT_ACROSS: additional effect on R^2 of this harmonic, if the deformations are orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
-# R^2 of deformations that are equal and opposite: lines that say nothing leave no more open.
+# Largest R^2 that is possible, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
@@ -254,7 +254,7 @@ class ModalVibration:
         ) is None
 
     def as_last_resort(self) -> ModalVibration:
-        """Return the same vibration with wider limits of doubt, for use if no better model exists."""
+        """Return the vibration with wider limits of doubt, for use if no better model exists."""
         return replace(self, last_resort=True)
 
     @property
@@ -277,7 +277,7 @@ class ModalVibration:
 
     @property
     def told(self) -> str:
-        """Describe what a choice is based on: the modes with their rates."""
+        """Describe the modes and their rates, on which a choice is based."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         if rates.size == 1:
@@ -490,7 +490,7 @@ class ModalVibration:
 def identify_modal(
     time: Samples, energy: Samples, *, kinetic: bool = False
 ) -> ModalVibration | None:
-    """Identify the modes of a structure from its energy in free flight; None if it has no lines.
+    """Identify the modes of a structure from its energy in free flight; None if the energy has no lines.
 
     The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in the kinetic
     energy changes slowly: the sum of elastic and kinetic energy of a mode falls monotonically.
@@ -560,7 +560,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
-    """Return the correlation of neighbouring misfits, at least 0, which is their share without white noise."""
+    """Return the correlation of neighbouring misfits, at least 0: their share that is not white noise."""
     products = np.sum(remainder[1:] * remainder[:-1])
     power = max(float(np.sum(remainder**2)), 1e-300)
     return float(np.clip(products / power, 0.0, 1.0))

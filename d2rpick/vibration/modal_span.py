@@ -60,7 +60,7 @@ def find_described(
 
 @remember
 def _grow_described(history: History, window: Span) -> ModalWindow | None:
-    """Extend a window whose modes continue undisturbed outside of it; None if they do not.
+    """Extend a window if its modes continue undisturbed outside of it; else return None.
 
     The result depends on the window alone, not on the td that was asked for first.
     """
@@ -84,7 +84,7 @@ def get_inner_window(history: History, guess: Span) -> Span:
 
 
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Yield windows to try: the guessed one, then later ones up to the end of the record."""
+    """Yield trial windows: first the guessed window, then later windows that reach the end of the record."""
     if guess is not None:
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:

@@ -1,4 +1,4 @@
-"""Decide which model of the vibration is reliable at a td, and describe the vibration by it.
+"""Decide which model of the vibration is reliable at a td, and describe the vibration by this model.
 
 The order is that of `MODELS`: an oscillator that describes the record before the modes of the structure and counted
 swings unless it leaves much over, and these before the energy alone.  The result is a `Vibration`: the energy around
@@ -46,13 +46,13 @@ if TYPE_CHECKING:
 # Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# Residual of a release without any vibration [-]; a pair with a larger residual preserves nothing.
+# Residual of a run that does not vibrate after td [-]; a pair with a larger residual preserves nothing.
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the time before td saves little [-], although its deformation is similar.
+# A tr in this last share of the time before td saves little time [-], although its deformation is similar.
 NEAR_TD: Final = 0.25
 # _OF_INTERVAL: largest distance of a match from the true minimum of the error, in intervals of the profile [-].
-# _OF_INTERVAL_BY_MODES: the same distance with modes, which are known between the states too [-].
-# With modes, 93 % of 2200 matches were within 1/8 interval, and for the others the error hardly changed.
+# _OF_INTERVAL_BY_MODES: this distance if modes describe the energy between the states too [-].
+# For modes, 93 % of 2200 matches were within 1/8 interval; the error of the other matches hardly changed.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 
 
@@ -390,7 +390,7 @@ class Evidence(NamedTuple):
         return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
 
     def is_that_of(self, other: Evidence) -> bool:
-        """Return True if the same models were found in the same record."""
+        """Return True if two objects have the same models of the same record."""
         same = self.fit is other.fit and self.span == other.span
         return same and all(
             self.models.get(name) is other.models.get(name) for name in MODELS

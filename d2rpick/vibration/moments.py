@@ -37,7 +37,7 @@ _ZERO = 1e-9
 # "crossing": the energy crosses the target energy.
 # "extremum": the energy has an extremum near the target energy.
 # "match": the deformation of several modes is similar to that at td.
-# "start": a flight without vibration starts.
+# "start": the start of a flight in which nothing vibrates.
 # "given": the user gave the time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 # Factor on the second differences of the energy, because E'' may be larger between the samples [-].
@@ -63,7 +63,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return E at a time, from the modes if they describe the record there, else from the samples [energy]."""
+        """Return the energy at a time, from the modes if they describe that time, else from the samples [energy]."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
@@ -72,7 +72,7 @@ class SampledEnergy:
         """Return the energy E at the given times, in their shape [energy]."""
         return self.history.energies_at(times)
 
-    def described(self, time: float) -> bool:  # noqa: ARG002  required by the interface
+    def described(self, time: float) -> bool:  # noqa: ARG002  the interface requires this argument
         """Return True if modes describe the energy at a time."""
         return False
 
@@ -89,7 +89,7 @@ class SampledEnergy:
         return times[in_question], rising[in_question]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
-        """Return the times from ``since`` to td (k,) at which the energy has an extremum near the level."""
+        """Return the times (k,) from ``since`` to td at which the energy has an extremum near the level at td."""
         time, energy = self._sampled_before(since)
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
@@ -218,7 +218,7 @@ class OscillatorEnergy(SampledEnergy):
     ) -> Samples:
         """Apply one function to times in the window described by the modes, another function to all others."""
         is_described = self.within(times)
-        if is_described.all():  # In the usual case the modes describe all times.
+        if is_described.all():  # Usually the modes describe all times.
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (

@@ -1,4 +1,4 @@
-"""Compute the floating oscillator (two masses, a spring, no support) in closed form, in free and in rigid motion.
+"""Compute the motion of a floating oscillator, free or rigid, in closed form: two masses, a spring, no support.
 
 Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers in this
 module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended mass ``M`` with displacement

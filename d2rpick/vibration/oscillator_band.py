@@ -56,7 +56,8 @@ def residual_band(
     stated_now, low, high = measures.band_about(
         squared, off, hidden, fit.hidden_share * squared
     )
-    # A hidden mode is as likely as none, so the stated residual includes half of the effect beyond solver errors.
+    # A hidden mode is assumed to exist with a probability of 1/2.
+    # So the stated residual includes half of the effect beyond solver errors.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
@@ -123,6 +124,6 @@ def _move_parameters(mode: Mode, step: Samples) -> Mode:
 
 
 def _compute_squared(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of each tr (n,) [-]."""
+    """Return the squared residual R^2 of each tr (n,) [-]."""
     lost = mode.separation(tr, td) + mode.kinetic_energy(td)
     return np.asarray(lost / mode.vibration_energy(td))

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 # _ENDS: trial windows end after td by these shares of the time after td [-].
 # One of the trial windows fills most of any flight of several periods.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Further trial windows end before td by these shares of the time before td [-], as td may be in the next contact.
+# Further trial windows end before td by these shares of the time before td [-].
+# They are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
 # The distance of each mark from the end of the record is this share of the distance of the next mark [-].
@@ -167,7 +168,7 @@ def find_described_span(
     whole: bool = False,
     quick: bool = False,
 ) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that one oscillator describes, or the last one before td.
+    """Find the longest window around td that one oscillator describes, or the last such window before td.
 
     First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
     grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
@@ -364,7 +365,7 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
 
 
 def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Span]:
-    """Yield windows to try: around td, the longest first, then before td."""
+    """Yield trial windows: first windows around td, from the longest, then windows before td."""
     start, end = bounds
     mark_of_td = _mark(bounds, td)
     beginnings = [start]
@@ -415,7 +416,7 @@ def _grow_span(
     *,
     quick: bool,
 ) -> tuple[Span | None, Identification]:
-    """Fit the window, extend it while the record follows the fit, refit, and repeat until it no longer changes."""
+    """Fit the window and extend it while the record follows the fit; repeat until the window no longer changes."""
     fit = fit_window(history, window, oscillator, quick=quick)
     span = window
     for _ in range(_MOST_REFITS):
@@ -451,7 +452,7 @@ def _clear_ends(
     *,
     quick: bool,
 ) -> tuple[Span, Identification]:
-    """Fit the window again without half a period at each end where the record leaves the fit.
+    """Cut off half a period at each end where the record leaves the fit, and fit the rest again.
 
     There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
     samples much better, it determines the window.
@@ -503,7 +504,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
 def measure_deviations(
     time: Samples, energy: Samples, fit: Identification
 ) -> tuple[Samples, Samples]:
-    """Return times, and how far the energy is off the fit near each of them, beyond noise.
+    """Return times, and the deviation of the energy from the fit near each time, beyond noise.
 
     A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
     deviation is the largest mean over a quarter of a period of the energy, within one such period.

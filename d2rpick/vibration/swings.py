@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turning point is counted if the energy then goes back by at least this share of its last change [-].
+# A turning point is counted if the next change of the energy is at least this share of the last change [-].
 _SWING: Final = 0.2
 # A minimum is not on the lower envelope if it deviates from the line through its neighbours by this share [-].
 _OFF_FLOOR: Final = 0.02
@@ -42,7 +42,7 @@ _MOST_BEATING, _STRETCHED = 0.75, 1.3
 # In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
 # _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of the hidden share [-].
-# In theory the factor is 2, but the lower envelope shows only a part of a hidden mode.
+# In theory this factor is 2, but the lower envelope shows only a part of a hidden mode.
 # _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
 # In 1,378 records of two modes, 98.2 % of the residuals below 0.3 were in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05

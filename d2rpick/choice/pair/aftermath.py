@@ -104,7 +104,7 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
     damping_left = 1 / compute_mean_decay(situation, time)
-    # On average half of the vibration energy is internal energy, in addition to the static energy.
+    # On average, half of the vibration energy is internal energy, which adds to the static energy.
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds

@@ -1,4 +1,4 @@
-"""Find and judge the candidates for tr at a given td: their times, their accuracy, and the objections to them.
+"""Find and judge the candidates for tr at a given td, with their accuracy and the objections to them.
 
 All candidates are judged at once, as columns; a `Candidate` is made only when it is looked up.
 """
@@ -189,14 +189,14 @@ class Judged:
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
-        """True for each candidate without objections, shape (n,)."""
+        """True for each candidate to which there is no objection, shape (n,)."""
         return np.asarray(
             ~np.logical_or.reduce([objection.holds for objection in self.objections])
         )
 
     @property
     def recommendable(self) -> NDArray[np.bool_]:
-        """True for each candidate that ``suggest`` and ``verify`` accept: without objections and within all limits."""
+        """True for each candidate that ``suggest`` and ``verify`` accept: no objection, and no limit is exceeded."""
         return self.acceptable & self.within_limits
 
     @property
@@ -291,7 +291,7 @@ class Candidates(Sequence[Candidate]):
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The recommended pair, which is faster to compute than the candidate; None if there is none."""
+        """The recommended pair, which is computed faster than the candidate; None if no pair is recommended."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
@@ -392,7 +392,7 @@ def _get_start_of_flight(situation: Situation) -> float:
 
 
 def _replace_nan(value: Any) -> Any:
-    """Return the value of a column, None for NaN."""
+    """Return the value of a column, or None if the value is NaN."""
     return None if value != value else value
 
 

@@ -28,8 +28,8 @@ CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
     "if so, choose another td"
 )
-# _USE_BEST: cure for a pair that can be used with care and is the best in the given range of td.
-# _AVOID_BEST: cure for a pair that cannot be used although it is the best in the given range of td.
+# _USE_BEST: advice if the best pair in the given range of td can be used with care.
+# _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
     "use this pair if only the motion matters, compare it with a finished switched run (d2rpick verify), "
     "or make fewer parts rigid (d2rpick parts)"
@@ -159,7 +159,7 @@ class Decision(NamedTuple):
         return "; ".join(cures)
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the cure of a cause; the best pair of a range cannot be cured by other times in it."""
+        """Return the advice that removes a cause; other times are not advised if the pair is the best of a range."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of

@@ -44,7 +44,7 @@ _DECIMALS: Final = 4
 # Rigid times that differ from the longest by at most this share are treated as equal [-].
 _LIKE_TIMES = 0.1
 
-# Largest residual of a good pair [-], which is also the default tolerance for tr.
+# A good pair has at most this residual [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
 # Largest upper bound of the residual of a good pair [-], which includes the effect of a mode hidden in the misfit.
 _MOST_HIDDEN: Final = 0.3
@@ -55,9 +55,9 @@ _BAND: Final = 0.25
 # MOST_WORTH_OF_FAIR: a pair is fair if the energy of its error is below this share of the energy of the contact [-].
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Number of states with which a flight is resolved; the cure for fewer states is an output interval that gives as many.
+# Number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# Largest number of parts that are named in a sentence.
+# A sentence names at most this number of parts.
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
@@ -134,7 +134,7 @@ def is_within_band(
     of that.  It is also on the same side of the limits of a grade, and of a release without any vibration.
     """
     limit = np.maximum(error_of_best, best)
-    # Warnings are not needed, because the bound is unknown if all errors are infinite.
+    # Numpy warnings are not needed, because the bound is unknown if all errors are infinite.
     with np.errstate(invalid="ignore"):
         highest = np.sqrt(np.fmax(2 * error_of_best**2 - best**2, limit**2))
     for bound in (POOR_RESIDUAL, NOTHING_KEPT):
@@ -253,7 +253,7 @@ class Cause(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """The reason without the numbers of this pair."""
+        """The reason in a form that contains no numbers of this pair."""
         return self.kind or self.reason
 
 
@@ -275,7 +275,7 @@ class Grade(NamedTuple):
 
     @classmethod
     def of(cls, poor: Sequence[Cause], fair: Sequence[Cause]) -> Grade:
-        """Make a grade: "poor" if there are causes for it, else "fair" if there are causes for that, else "good"."""
+        """Make a grade: "poor" or "fair" if there are causes for this grade, else "good"."""
         if poor:
             return cls("poor", tuple(poor))
         return cls("fair", tuple(fair)) if fair else cls("good")

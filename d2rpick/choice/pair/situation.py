@@ -51,7 +51,8 @@ _SOLVER_ERROR: Final = 1e-5
 _FAINT: Final = 1e-4
 # If an oscillator describes at least this share of the record, no modes are fitted [-].
 _MOST_OF_RECORD: Final = 0.5
-# Rounding error in units of the last digit, because a constant energy may alternate between two printed values.
+# Rounding error of a printed energy, in units of its last digit.
+# A constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
 
@@ -230,7 +231,7 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance; for many modes also the error without any vibration."""
+        """Largest error of an acceptable tr [-]: the tolerance; for many modes also the error of no vibration."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
@@ -438,7 +439,7 @@ def _choose_longer_window(
 def _skip_first_quarter(
     history: History, fit: Identification | None, span: Span | None
 ) -> Described | None:
-    """Return the window of an oscillator without its first quarter period, unless the record begins with it.
+    """Cut off the first quarter period of an oscillator's window, unless the window begins with the record.
 
     While the deformation passes through zero, the energy does not show a load below 10 % of the amplitude.  At the
     largest deformation it shows 1 %.  Each quarter period contains a zero or a largest deformation.

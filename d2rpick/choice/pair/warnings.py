@@ -42,7 +42,7 @@ _FEW_STATES = 4
 POOR_KINETIC_SHARE = 0.5
 # A pair with a larger residual is poor [-], because its error has more than 25 % of the vibration energy.
 POOR_RESIDUAL = 0.5
-# A warning is issued if the plastic energy exceeds this share of the vibration energy [-]; it may be a preload.
+# A warning is issued if the plastic energy, which may be a preload, exceeds this share of the vibration energy [-].
 _NOTABLE_PLASTIC = 0.05
 
 # Assumed static energy as a share of the lowest energy in flight [-], as many modes are never all at zero deformation.
@@ -52,7 +52,7 @@ _AT_REST = 0.85
 # Largest mean energy after td relative to the reference run [-], which may exceed 1 because the estimate is inexact.
 # Switching adds no energy, so a larger ratio shows that there is a contact in the flight.
 MOST_KEPT = 1.2
-# Largest exponent with which the exponential function does not overflow.
+# Largest argument for which the exponential function does not overflow.
 _LARGEST_EXPONENT = 700.0
 
 
@@ -215,7 +215,7 @@ def _describe_early_contact(situation: Situation) -> str:
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning with a cure if a flight is uncertain although more than the energy of the parts shows it."""
+    """Yield a warning, with advice, if a flight is uncertain although more than the parts' energy shows the flight."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
@@ -305,12 +305,12 @@ def _describe_not_predicted(
 
 
 def describe_end_of_load(situation: Situation) -> str:
-    """Describe ``earliest_tr``: the start of the flight, and the margin if there is one."""
+    """Describe ``earliest_tr``: the start of the flight, plus the margin if there is a margin."""
     return f"the end of the load at {situation.flight.start:.6g}{_describe_margin(situation.settings.margin)}"
 
 
 def describe_end_of_flight(situation: Situation) -> str:
-    """Describe ``latest_td``: the end of the flight, and the margin if there is one."""
+    """Describe ``latest_td``: the end of the flight, minus the margin if there is a margin."""
     return f"the end of the flight at {situation.flight.end:.6g}{_describe_margin(situation.margin)}"
 
 
@@ -601,7 +601,7 @@ def _tell_undescribed(
 
 
 def _tell_always(reason: str, _: int) -> list[str]:
-    """Return an objection that is the same for every candidate."""
+    """Return an objection that applies to every candidate."""
     return [reason]
 
 
@@ -619,7 +619,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate is worse than a release without any vibration."""
+    """Return the objection that a candidate is worse than a run that does not vibrate after td."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -645,7 +645,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that a pair is worse than a release without vibration, or than the best pair at this td."""
+    """State that a pair is worse than no vibration after td, or than the best pair at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

@@ -28,7 +28,7 @@ _BELOW = 1e-12
 
 # Largest deviation of the error from its polyline [-], which is half of the last printed digit.
 _EXACT: Final = 5e-4
-# Largest number of times that an interval is halved if the error in it is curved.
+# An interval in which the error is curved is halved at most this number of times.
 _HALVINGS: Final = 20
 
 

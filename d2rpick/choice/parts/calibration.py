@@ -61,7 +61,7 @@ _US: Final = 1e6
 
 
 class Observation(NamedTuple):
-    """The CPU time per cycle of one leg of a run [us], and the elements and nodes computed in the leg.
+    """The CPU time per cycle of one restart segment of a run [us], and the elements and nodes computed in the segment.
 
     ``counts`` has the number of deformable elements by class; ``elements`` is None if the solver writes the total only.
     """
@@ -76,7 +76,7 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """The fitted weights, and for each the number of legs that determine it.
+    """The fitted weights, and for each weight the number of restart segments that determine it.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
     """
@@ -89,7 +89,7 @@ class FittedWeights:
 
 
 def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
-    """Fit weights to legs with and without rigid parts.
+    """Fit weights to the CPU times of restart segments, in some of which parts are rigid.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def _make_start_values(
 def _build_equations(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
-    """Return the matrix and the right-hand side of the equations of all legs."""
+    """Return the matrix and the right-hand side of the equations of all restart segments."""
     rows, right_side = [], []
     for observation in observations:
         counts = [observation.counts.get(name, 0.0) for name in classes]
@@ -212,7 +212,7 @@ class _RigidPart(NamedTuple):
 def read_observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
-    """Read the CPU times of the legs of several runs; files of equal content are used once.
+    """Read the CPU times of the restart segments of several runs; files of equal content are used once.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def read_observations_of_runs(
 
 
 def read_observations(folder: str) -> tuple[Observation, ...]:
-    """Read the CPU times of the legs of the run in a folder.
+    """Read the CPU times of the restart segments of the run in a folder.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def _read_termination_time(deck: Deck) -> float:
 def _make_observation(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Return the observation of a leg in which each part was rigid for the fraction ``lasting`` of the time."""
+    """Return the observation of a restart segment; each part was rigid in it for a fraction ``lasting`` of the time."""
     counts, nodes = _count_computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(

@@ -1,4 +1,4 @@
-"""Model the cost of a time step, and the share of it that is saved while selected parts are rigid.
+"""Model the cost of a time step, and the share of this cost that is saved while selected parts are rigid.
 
 A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
 integration points through the thickness. s is the share of the elements in the cost of a step; assembly, contact and
@@ -229,7 +229,7 @@ class CostModel:
 
 
 def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
-    """Return the sum of costs, with all formulations without a weight."""
+    """Return the sum of costs, with all formulations that have no weight."""
     cost = 0.0
     unknown = list[str]()
     for amount in amounts:
@@ -322,5 +322,6 @@ def _parse_weight(path: str, name: str, value: object) -> float:
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:
         return float(value)
-    except OverflowError:  # The integer has hundreds of digits.
+    # The integer has hundreds of digits, which a float cannot hold.
+    except OverflowError:
         return float("inf")

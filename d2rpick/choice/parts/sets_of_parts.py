@@ -182,7 +182,7 @@ def compare_sets_of_parts(
             )
         else:
             still_parts = ()
-        # Parts that do not move relative to the others may fly longer than the parts that do.
+        # Parts that stay at rest relative to the body may fly longer than parts that move relative to it.
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
     recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))

@@ -201,7 +201,7 @@ def _read_masses(run: OpenedRun) -> dict[int, float]:
 
 
 class PartRow(NamedTuple):
-    """All data of one part; None for unknown values.
+    """All data of one part; unknown values are None.
 
     ``cost_share`` is the share of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable
     time step [time]; ``mass_source`` and ``step_source`` name their sources.  ``flights`` has the data of the part in
@@ -273,7 +273,7 @@ def _describe_part(
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
-        counts = None  # The elements may be in a file that was not read.
+        counts = None  # The elements of the part may be in a file that was not read.
     if by_deck[1] is None:
         step, source = printed.get(part, (None, None))
     else:
@@ -314,7 +314,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the kind of a part: the kind of its material, or "spring" or "particles" if its elements are such."""
+    """Return the kind of a part: "spring" or "particles" if its elements are such, else its material's kind."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:

@@ -57,7 +57,7 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
 )
 # Distance of Tukey's fences, beyond which a value is an outlier, from the quartiles, in interquartile ranges [-].
 _FENCE: Final = 1.5
-# Largest number of runs named in a sentence.
+# A sentence names at most this number of runs.
 NAMED: Final = 3
 # Share of the rigid time that may be lost by rounding tr to fewer digits [-].
 _ROUNDED: Final = 0.001
@@ -138,7 +138,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs, with the window that all runs share [time]; None, with the reason, if there is none.
+    """One tr for all judged runs, with the window that all runs share [time]; None, with the reason, if no tr suits.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
@@ -381,7 +381,7 @@ def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
 
 
 def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
-    """Return a digest of each file of a run; of its name if the file can no longer be read."""
+    """Return a digest of each file of a run, or of the file's name if the file can no longer be read."""
     digests = []
     for stamp in row.files:
         try:
@@ -484,7 +484,7 @@ def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
 
 
 def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
-    """Return the median tr of runs that agree, moved into the interval common to all; None if they do not agree."""
+    """Return the median tr of runs, moved into the interval common to all; None if the runs do not agree."""
     tr_of_runs, low, high = _find_common_interval(judged)
     if len(tr_of_runs) < len(judged) or low > high:
         return None
@@ -557,7 +557,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 
 
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the outliers: judged runs without a tr, then runs whose tr lies beyond Tukey's fences.
+    """Return the outliers: first judged runs for which no tr exists, then runs whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.
     """

@@ -42,7 +42,7 @@ _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; None for unknown quantities.
+    """Measures of a switched run; unknown quantities are None.
 
     The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
 
@@ -253,7 +253,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the change up to which an energy is constant [energy]: a small share of it, or its rounding error."""
+    """Return the change up to which an energy is constant [energy]: its rounding error, or a small share of it."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -293,7 +293,7 @@ def _check_rigid_window(
     td: float,
     limit: float,
 ) -> Iterator[str]:
-    """Yield an objection if the energy is not constant from tr to td, as far as the states show.
+    """Yield an objection if the states show that the energy is not constant from tr to td.
 
     A constant energy before tr or after td matters only if that of the reference run is not constant there.
     """

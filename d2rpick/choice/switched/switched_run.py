@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Kinds of evidence that determine the start of a flight to within a few states; the energy alone does not.
+# Sources of a flight whose start is accurate to a few states, unlike a flight found from the energy alone.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # The parts are treated as not moving if they carry less than this share of the momentum of the model [-].
 _HARDLY: Final = 0.1
@@ -169,7 +169,7 @@ def prepare_switched_history(
 
 
 def select_model_momenta(history: History) -> History:
-    """Return a history without part momenta, as rigid bodies have replaced parts.
+    """Remove the part momenta from a history, because rigid bodies have replaced parts.
 
     Energies of rigid solids are meaningless, so only the momentum of the model shows whether the model flies.  What is
     written of the parts is kept for flights in which they are deformable.
@@ -184,7 +184,7 @@ def select_model_momenta(history: History) -> History:
 
 
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Return the windows in which parts are rigid, as far as part quantities show them [time].
+    """Return the windows in which parts are rigid according to their written quantities [time].
 
     If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """

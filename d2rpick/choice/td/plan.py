@@ -241,7 +241,7 @@ def _list_rows(
     """Yield every flight with its window, which is planned as if it were the first window."""
     last = max((done.td for done in done_rows), default=None)
     record = reference.history.duration
-    landed: float | None = None  # end of the previous flight
+    landed: float | None = None  # This is the end of the previous flight [time].
     for number, found_flight in enumerate(flights, start=1):
         flight = _apply_given_start(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
@@ -415,7 +415,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
 def _warn_about_windows(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[Caution]:
-    """Yield the warnings about all windows, without duplicates."""
+    """Yield each warning about the windows once."""
     for done in done_rows:
         window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.description}"
         if done.rigid_in_contact:

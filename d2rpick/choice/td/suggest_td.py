@@ -48,9 +48,9 @@ _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
 # Number of td in a uniform grid, which suffices for a smooth curve on paper and on a screen.
 STEPS: Final = 200
-# number of decimals of an error that are shown to the user
+# Number of decimals with which errors are shown to the user.
 _READ: Final = 3
-# A pair is mentioned if it is rigid for longer than the recommended one, by at least this share of the td range [-].
+# A pair is mentioned if its rigid time exceeds that of the recommended pair by this share of the td range [-].
 _MUCH: Final = 0.1
 # Safety factor on the uncertainty of the contact time that is estimated from the energy [-].
 # In 20 computed falls, the estimate of the uncertainty was too small by a factor of up to 1.9.
@@ -138,7 +138,7 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, or in the longest flight for None, with a tr at or after ``since``.
+    """Choose td in ``window``, or in the longest flight if it is None, with a tr at or after ``since``.
 
     Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
     certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
@@ -203,7 +203,7 @@ def list_offered_times(
         peaks = peaks[highest]
         grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
-    # A run that ends at td is useless.
+    # The end of the run is no td, because a run that ends at td is useless.
     return times[times < situation.history.end], set(peaks.tolist())
 
 
@@ -351,7 +351,7 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
     """
     history = situation.history
     flight = situation.flight
-    # td must not be the last state, because a run that ends at td is useless
+    # The last state is no td, because a run that ends at td is useless.
     last = min(window[1], round_down_as_read(float(history.time[-2])))
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
@@ -369,7 +369,7 @@ def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
     for td in (low, (low + high) / 2, high):
         situations.append(look(td))
         if _rate_certainty(situations[-1], window) == (False, 0, False):
-            break  # no situation can be more certain
+            break  # No situation can be more certain than this one.
     return min(situations, key=lambda situation: _rate_certainty(situation, window))
 
 
@@ -558,7 +558,7 @@ def _choose_by_level(
 def _list_by_rigid_time(
     situation: Situation, times: Iterable[float]
 ) -> Iterator[Choice]:
-    """Yield acceptable choices by descending bound of the rigid time, while a longer one is possible."""
+    """Yield acceptable choices by descending bound of the rigid time, while a longer rigid time is possible."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     bounds = bound_rigid_times(situation, tds)
@@ -572,7 +572,7 @@ def _list_by_rigid_time(
 
 
 def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """Return the situations with their recommended pairs, without pairs that save nothing."""
+    """Return the situations whose recommended pair saves time, with this pair."""
     return [
         (candidates.situation, candidates.saving)
         for candidates in rank_candidates([*situations], in_flight=True)
@@ -581,7 +581,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, or the last of several equal ones; None if there is none."""
+    """Return the choice with the longest rigid time, or the last of several equal choices; else None."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

@@ -188,7 +188,7 @@ class TradeOff:
 
     @property
     def more_accurate(self) -> Offer | None:
-        """The offer with the smallest error; None if the recommended one has it, or if its error is of another kind."""
+        """The offer with the smallest error; None if it is the recommended offer, or has another kind of error."""
         recommended = self.recommended
         if recommended is None:
             return None
@@ -366,7 +366,7 @@ def _warn_about_window(
     offers: Sequence[Offer],
     suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
-    """Yield the warnings that concern the whole window. Warnings about a single td belong to its offer."""
+    """Yield the warnings that concern the window; warnings about a single td belong to the offer for this td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
         caution for caution in warn_about_td(situation) if caution.code not in of_td

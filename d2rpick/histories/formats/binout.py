@@ -100,7 +100,7 @@ class Binout(Database):
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:
-        """Return a branch by name; raise FormatError if there is none, or if records of any branch are lost."""
+        """Return a branch by name; raise FormatError if it is missing, or if records of any branch are lost."""
         for branch in self._branches:
             if branch and branch.damage:
                 raise FormatError(

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Stands for the offset of a field that is truncated, or that occurs twice in the block.
+# Value in place of the offset of a field that is truncated, or that occurs twice in the block.
 UNSURE: Final = -1
 
-# length [bytes] from which a line is longer than any line of a solver
+# A line of at least this length is longer than any line that a solver writes [bytes].
 _OVERLONG: Final = 512
 
-# number of bytes compared at once; they fit into the processor's cache
+# Number of bytes that are compared at once, which fit into the processor's cache.
 CHUNK: Final = 1 << 20
 # Number of adjacent blocks compared as one row, which halves the time.
 _FOLD: Final = 16
@@ -35,7 +35,7 @@ _LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
-_EXACT: Final = 22  # largest exponent of a power of ten that a double holds exactly
+_EXACT: Final = 22  # Largest exponent of a power of ten that a double holds exactly.
 # Bit flags of a negative exponent and of a negative number; lower bits hold the two digits of the exponent.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
@@ -354,7 +354,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    # The mantissas are still exact here.
+    # The mantissas are exact at this point.
     values: Samples = weights @ digits[:-2].astype(np.float64)
     tens, units = digits[-2:]
     scale = (

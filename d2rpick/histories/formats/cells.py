@@ -47,7 +47,8 @@ _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-_RULE: Final = "-=+|:_ \t"  # characters of a line drawn between rows or around a table
+# Characters of a line that is drawn between rows or around a table.
+_RULE: Final = "-=+|:_ \t"
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 

@@ -217,7 +217,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | C
 
 
 class Table(Database):
-    """A table as a `Database` without parts; raises FormatError if the text is not a table or lacks a column."""
+    """A table as a `Database` that has no parts; raises FormatError if the text is not a table or lacks a column."""
 
     format = "csv"
     named_by_people = True
@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name means an internal energy, or the only one besides the time; else raise FormatError."""
+        """The column whose name means internal energy, or the only column besides the time; else raise FormatError."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
-# largest number of characters of a line that are searched for a label
+# A label is expected in this number of first characters of a line.
 _LONGEST_LABEL: Final = 1000
 # Pattern of the type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
@@ -77,7 +77,7 @@ class _CurveText:
         self.curves: list[_TextCurve] = []
         self.x_label = self.time_unit = ""
         self.stops = ""
-        self.last = 0  # number of the line that was read last
+        self.last = 0  # Number of the line that was read last.
 
     def top(self, count: int) -> list[str]:
         """Return the first lines of the text that are neither blank nor comments."""
@@ -126,7 +126,7 @@ class _CurveText:
 
 
 class Curves(Database):
-    """The curves of one text as a `Database` without parts; its times are those of the first requested curve."""
+    """The curves of one text as a `Database` that has no parts; its times are those of the first requested curve."""
 
     format = "csv"
     named_by_people = True
@@ -166,7 +166,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only one whose name means an internal energy; else raise FormatError.
+        """The only curve, or the only curve whose name means an internal energy; else raise FormatError.
 
         The error lists all curves.
         """
@@ -312,7 +312,7 @@ def _remove_type(line: str) -> str:
 
 
 def _find_unit_of_type(line: str) -> str:
-    """Return the unit of time that the factor of a label stands for, empty if there is none."""
+    """Return the unit of time that the factor of a label stands for; empty if the label has no factor."""
     match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
     factor = parse_cell(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")

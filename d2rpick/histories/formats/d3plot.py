@@ -57,7 +57,7 @@ _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _WALL: Final = "rigid_wall_{}_force"
-# number of bytes at the end of a file that are searched for its end mark
+# The end mark of a file is expected in this number of bytes at its end.
 _TAIL: Final = 1 << 16
 
 

@@ -25,15 +25,16 @@ _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # length of the section of numbers before its ids [words]
+_NUMBERING: Final = 10  # Length of the section of numbers before its ids [words].
 # Length of the head of the section of numbers if it also lists part ids [words].
 _PART_NUMBERING: Final = 16
-_TITLE: Final = 72  # length of a title [bytes]; it does not depend on the word width
+# Length of a title [bytes], which does not depend on the word width.
+_TITLE: Final = 72
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
 _OTHER_TITLES: Final = (90_002, 90_020)
-_KEYWORD: Final = 80  # length of a line of keywords [bytes]
+_KEYWORD: Final = 80  # Length of a line of keywords [bytes].
 _MOST_TITLES: Final = 1_000_000
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-# end mark of the geometry, of the titles, and of the states of each file
+# Number that marks the end of the geometry, of the titles, and of the states of each file.
 END: Final = -999999.0
 HEAD: Final = 512  # Length of the control words if a word has 8 bytes [bytes].
 # Number of control words in any file; ``extra`` is the number of additional control words.
@@ -34,11 +34,11 @@ _PLACES: Final = {
     "nel27": 66, "nel21p": 68, "nel15t": 69, "nel20t": 71, "nel40p": 72, "nel64": 73, "quadr": 74, "cubic": 75,
     "penout": 78, "engout": 79,
 }  # fmt: skip
-_SIGNED: Final = ("nel8", "maxint")  # control words whose sign is a flag
+_SIGNED: Final = ("nel8", "maxint")  # Control words whose sign is a flag.
 # Index of the word that contains the name of the release; the release number follows.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # number that is added to the file type if ids have 8 bytes
+LONG_IDS: Final = 1000  # Number that is added to the file type if ids have 8 bytes.
 _DIMENSIONS: Final = range(2, 10)
 
 
@@ -75,7 +75,7 @@ def detect_form(head: bytes) -> Form | None:
 
 
 def detect_family(head: bytes) -> str | None:
-    """Return the family (d3plot, d3thdt or d3part) of a file with these first bytes; None if there is none."""
+    """Return the family (d3plot, d3thdt or d3part) of a file with these first bytes, or None for other files."""
     form = detect_form(head)
     if form is None:
         return None
@@ -121,7 +121,7 @@ class Words:
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
     def integers(self, word: int, count: int) -> tuple[int, ...]:
-        """Return ``count`` integers from a word on."""
+        """Return ``count`` integers that start at a word."""
         data = self.bytes(word * self.form.width, count * self.form.width)
         return tuple(np.frombuffer(data, self.form.integer).tolist())
 
@@ -133,7 +133,7 @@ class Words:
         return bool(np.frombuffer(data, self.form.real)[0] == END)
 
     def has(self, at: int, size: int) -> bool:
-        """Return True if the file has at least ``size`` bytes from byte ``at`` on."""
+        """Return True if the file has at least ``size`` bytes after byte ``at``."""
         return at + size <= len(self._content)
 
     def damaged(self, content: str) -> FormatError:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     Fields = NDArray[np.bytes_]
 
-_RECENT: Final = 12  # number of recent layouts that are tried before a block is parsed
+_RECENT: Final = 12  # This number of recent layouts is tried before a block is parsed.
 # Upper limit for the length of the first line of a block [bytes].
 _LINE: Final = 1 << 10
 
@@ -70,7 +70,7 @@ class Blocks(Database):
 
     # Positions of differing bytes are stored only for at least this number of equal blocks, to save memory.
     many = 64
-    # number of numbers converted at once, which fit into the processor's cache
+    # Number of printed numbers that are converted at once, which fit into the processor's cache.
     batch = 1 << 14
 
     def __init__(
@@ -132,7 +132,7 @@ class Blocks(Database):
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
-            # A second request is usually followed by more, so all blocks are compared once.
+            # A second request is usually followed by more requests, so all blocks are compared once.
             self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}

@@ -34,7 +34,8 @@ _ENERGY: Final = "internal energy"
 # Label of the energy of springs, a part of the internal energy that is always needed and thus read in advance.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # number of bytes at the start of a file that contain the header and the first state
+# The header and the first state lie in this number of bytes at the start of a file.
+_NEAR: Final = 4096
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 # The last line of a state in every known glstat; mass scaling may add lines after it.
@@ -67,7 +68,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
 
 
 class Glstat(Blocks):
-    """One glstat file; a ``Database`` without parts.
+    """One glstat file; a ``Database`` that has no parts.
 
     A last state within which the file ends is used if it has the lines that are ``needed``. Raises FormatError if
     there is neither a head nor a state, or if a time is not a number.
@@ -95,7 +96,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # False if a state lacks a line that other states have.
+        # The value is False if a state lacks a line that other states have.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -123,7 +124,7 @@ class Glstat(Blocks):
         return dict(zip(names, map(freeze, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
-        """Return the labels of all lines with values, without the time."""
+        """Return the labels of all lines with values, except the time."""
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}

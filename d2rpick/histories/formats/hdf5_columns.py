@@ -31,7 +31,8 @@ _PICKLED_INDEX_NAME: Final = re.compile(
 # Starts of the names of groups without histories: index trees of PyTables, references of MATLAB.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-_WIDEST: Final = 64  # largest number of columns of a table without column names that is read as histories
+# A table without column names is read only if it has at most this number of columns.
+_WIDEST: Final = 64
 
 # Largest share of the file for which a dataset is copied; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
@@ -183,7 +184,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    # Groups whose layout has its own reader, which reads them completely.
+    # These groups have a layout with its own reader, which reads the groups completely.
     read_groups: list[str] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # largest number of columns that a message lists
+_MANY: Final = 12  # A message lists at most this number of columns.
 _BRANCHES: Final = ("glstat", "matsum")
 # Exceptions that h5py raises for a damaged file.
 _DAMAGED: Final = (
@@ -59,8 +59,8 @@ _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 # Time-out of a read, in addition to 1 s per 100 kB [s]. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
-_SLOWEST: Final = 100_000  # slowest expected reading speed [bytes/s]
-_USER_BLOCK: Final = 512  # number of bytes that MATLAB puts before the file
+_SLOWEST: Final = 100_000  # Slowest expected reading speed [bytes/s].
+_USER_BLOCK: Final = 512  # Number of bytes that MATLAB puts before the HDF5 content.
 
 
 def recognises(data: bytes) -> bool:
@@ -99,7 +99,7 @@ def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
+    """The columns of an HDF5 file of any layout, by their paths; a `Database` that has no parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -315,7 +315,7 @@ def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
 
 
 def _read_line(group: h5py.Group, name: str) -> str:
-    """Return a string that was saved as an array of one element; an empty string if there is none."""
+    """Return a string that was saved as an array of one element; an empty string if nothing was saved."""
     if name not in group:
         return ""
     values = np.ravel(group[name][()])

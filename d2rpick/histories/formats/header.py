@@ -14,7 +14,7 @@ from d2rpick.histories.names import is_unit, normalise_name
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-_SHORT: Final = 60  # largest number of characters of a line that a message quotes
+_SHORT: Final = 60  # A message quotes at most this number of characters of a line.
 # The first columns of OpenRadioss' th_to_csv in every version of this program.
 # In some versions, the number of names differs from the number of columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
@@ -147,7 +147,7 @@ def _join_names(upper: str, lower: str) -> str:
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return one name per column, without empty cells after them; [] if there are too few or too many names."""
+    """Return one name per column, and drop empty cells at the end; [] if there are too few or too many names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])

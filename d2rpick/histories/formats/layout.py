@@ -40,7 +40,7 @@ _FORMS = (
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Numbers of lines that are searched for the first row, in up to three attempts.
+# The first row is expected in these numbers of lines, in up to three attempts.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -144,7 +144,7 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator that ``rows`` prove, if some of their cells are not numbers without it."""
+    """Add the thousands separator that ``rows`` prove, if some of their cells are numbers only with this separator."""
     odd = [
         cell
         for row in rows
@@ -157,7 +157,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
 
 
 def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
-    """Return the error for a text without a table; the error quotes the first likely row, or the first line."""
+    """Return the error for a text that contains no table; the error quotes the first likely row, or the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
     ]
@@ -176,7 +176,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
-    """Search for the rows in few lines, then in more lines, each time without and with thousands separators."""
+    """Search for the rows in few lines, then in more lines; thousands separators are tried in a second pass."""
     candidates = (
         (number, line)
         for number, line in enumerate(lines)

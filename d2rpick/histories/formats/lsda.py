@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # record types of symbol tables and their entries
-_LONGEST: Final = 1 << 32  # upper limit for the length of a symbol table [bytes]
+_TABLES: Final = range(4, 8)  # Record types of symbol tables and their entries.
+_LONGEST: Final = 1 << 32  # Upper limit for the length of a symbol table [bytes].
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {
@@ -216,7 +216,7 @@ class Lsda:
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        """Read the records from a byte offset on, and collect the directories of the requested branches."""
+        """Read the records after a byte offset, and collect the directories of the requested branches."""
         data = self.data
         unpack = self._head.unpack_from
         head = self._head.size

@@ -47,10 +47,10 @@ _AXES: Final = (
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
-_MAT: Final = "mat.#"  # text that begins the lines of a part
+_MAT: Final = "mat.#"  # Text that begins the lines of a part.
 # The part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
-# placeholder for a part number that is damaged, or too long for its columns
+# Placeholder for a part number that is damaged, or too long for its columns.
 _UNREADABLE: Final = -1
 # Largest part number that fits into its eight columns.
 _WIDEST: Final = 99_999_999
@@ -61,7 +61,7 @@ _LEGEND: Final = re.compile(
 _ENTRY: Final = re.compile(
     rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE
 )
-_LONGEST: Final = 1 << 24  # upper limit for the length of a legend [bytes]
+_LONGEST: Final = 1 << 24  # Upper limit for the length of a legend [bytes].
 _LINE: Final = re.compile(
     rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$",
     re.MULTILINE,
@@ -90,7 +90,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
 
 
 class Matsum(Blocks):
-    """One matsum file; a ``Database`` without channels of the whole model.
+    """One matsum file; a ``Database`` that has no channels of the whole model.
 
     Raises FormatError if it has neither a head nor a state, or if a time is not a number.
     """

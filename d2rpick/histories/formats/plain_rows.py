@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Samples
 
-_UNIT_SEPARATOR: Final = "\x1f"  # a control character that occurs in no table
+_UNIT_SEPARATOR: Final = "\x1f"  # A control character that occurs in no table.
 # Largest relative error of the fast number parser of pandas, which counts leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
@@ -108,7 +108,7 @@ def _read_with_pandas(
         "quoting": QUOTE_NONE,
     }
     options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
-    # From pandas 3.1 on, the default parser is as exact as `float`.
+    # Since pandas 3.1, the default parser is as exact as `float`.
     if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:
         if columns is None and layout.separator:
             fast = pd.read_csv(

@@ -25,17 +25,18 @@ if TYPE_CHECKING:
 INT: Final = struct.Struct(">i")
 # Size of a binary number, and of the record length before and after each record [bytes].
 WIDTH: Final = 4
-RUN: Final = 84  # size of the first record [bytes]: a code and a title of 80 bytes
+# Size of the first record [bytes], which contains a code and a title of 80 bytes.
+RUN: Final = 84
 
 _MARK: Final = b"ZZZZZEOR"
 _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n")
 _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
-_LONG, _SHORT = 10, 5  # number of columns of an integer in the two text formats
+_LONG, _SHORT = 10, 5  # Number of columns of an integer in the two text formats.
 # Fortran prints these characters in place of a number that is too long.
 _STARS: Final = b"*" * _SHORT
-# Upper limit for the length of a header record without its integers [bytes].
+# Upper limit for the length of a header record, apart from its integers [bytes].
 _ROOM: Final = 1024
 # Number of characters of the run title in text files (80 in binary files).
 _RUN_TITLE: Final = 72
@@ -78,7 +79,7 @@ def open_records(data: Content, source: str) -> Records:
 class Records:
     """The layout of the records in a binary file; ``at`` is the offset of the next header record."""
 
-    width = WIDTH  # size of a number in a state [bytes]
+    width = WIDTH  # Size of a number in a state [bytes].
 
     def __init__(self, data: Content, at: int = 0) -> None:
         self._data, self.at = data, at

@@ -46,7 +46,8 @@ _TITLES: Final = (
     100,
 )
 
-# Global variables in the order of the file: the first 12 up to version 2024, 16 in version 2025, 22 since version 2026.
+# Global variables in the order of the file.
+# A file has the first 12 up to version 2024, the first 16 in version 2025, and all 22 since version 2026.
 _GLOBALS: Final = (
     "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum", "mass", "time_step",
     "rotation_energy", "external_work", "spring_energy", "contact_energy", "hourglass_energy",
@@ -96,8 +97,8 @@ class _Head(NamedTuple):
     parts: tuple[Part, ...]
     # Index of a part's variable among the variables of all parts.
     columns: dict[tuple[int, str], int]
-    counts: tuple[int, ...]  # number of values in each record of a state
-    groups: tuple[_Group, ...]  # groups with histories, whose records end each state
+    counts: tuple[int, ...]  # Number of values in each record of a state.
+    groups: tuple[_Group, ...]  # Groups with histories, whose records end each state.
 
 
 def recognises(head: bytes) -> bool:
@@ -314,7 +315,7 @@ class TimeHistory(Database):
         return states, (stop,) if bytes_left else ()
 
     def _silent_parts(self) -> tuple[str, ...]:
-        """Return a note on parts without variables."""
+        """Return a note on parts that have no variables."""
         silent = [part.id for part in self._head.parts if part not in self.parts]
         if not silent:
             return ()
@@ -331,7 +332,7 @@ class _HeadRecords:
         self._records = records
         self._most = file_size
         self._source = source
-        # Length of the titles [bytes], the same in all records; 0 until the first title is read.
+        # Length of the titles [bytes], equal in all records; 0 until the first title is read.
         self._title = 0
 
     def head(self) -> _Head:

@@ -31,7 +31,7 @@ class ReadColumns(NamedTuple):
 def read_columns(
     text: Text, begin: int, layout: Layout, used: Sequence[int]
 ) -> ReadColumns:
-    """Read the columns ``used`` of the rows from byte ``begin`` on; the first of them is the time.
+    """Read the columns ``used`` of the rows that start at byte ``begin``; the first of these columns is the time.
 
     Between the rows there may be comments and blank lines; below them words (such as a total) and the same table
     again. A row whose used cells are all empty ends the curve, while a longer curve next to it may go on.
@@ -101,7 +101,7 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """State of the reader of a table: the states read so far, and the lines found below the table."""
+    """Progress of the reader of a table: the states read so far, and the lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
@@ -115,7 +115,7 @@ class _Curve:
         self._below: _Below | None = None
         # Number of states of the table that are repeated below the table.
         self._repeated = 0
-        # line number of the first repeated state below the table
+        # Line number of the first repeated state below the table.
         self._repeated_from = 0
 
     @property

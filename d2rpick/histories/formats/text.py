@@ -41,7 +41,8 @@ class Text:
     """
 
     # The numbers below limit how many lines and bytes are read at once.
-    top = HEAD  # number of lines from which encoding, separator and header of the text are determined
+    # Number of lines from which encoding, separator and header of the text are determined.
+    top = HEAD
     # Size of a piece, whose cells fit into the processor's cache [bytes].
     piece = 1 << 17
     # Largest text of which all fields are used to find the printed precision [bytes].
@@ -66,7 +67,7 @@ class Text:
 
     @property
     def is_short(self) -> bool:
-        """True if ``head`` contains all lines (apart from an unterminated last line)."""
+        """The value is True if ``head`` contains all lines, apart from an unterminated last line."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -90,7 +91,7 @@ class Text:
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
-        """Yield complete lines from byte ``begin`` on, in pieces of many lines (``large`` for larger pieces).
+        """Yield the complete lines after byte ``begin``, in pieces of many lines; ``large`` gives larger pieces.
 
         Raises FormatError after the last piece if the file was rewritten meanwhile.
         """
@@ -115,7 +116,7 @@ class Text:
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines after byte ``begin``, from the start, from the end and in between; of a short text all lines."""
+        """Return lines after byte ``begin``: all of a short text, else some at the start, at the end and in between."""
         data = self._data
         end = self._end
         count = self.some
@@ -267,7 +268,8 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
         return False
     decimals, width = shapes.pop()
     padded = any(part[2].endswith("0") for part in parts[1:] if part)
-    longest_start = 32  # first two digits of 324, the largest exponent of a double
+    # These are the first two digits of 324, the largest exponent of a double.
+    longest_start = 32
     exponent = parts[0][3] if parts[0] else None
     doubtful = (
         width == 2
@@ -296,7 +298,7 @@ def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
 
 
 def _decimals(field: str) -> int:
-    """Return the number of decimals of a number without an exponent; 0 for any other field."""
+    """Return the number of decimals of a number that has no exponent; any other field gives 0."""
     parts = _PARTS.fullmatch(field)
     return len(parts[2]) if parts and parts[3] is None else 0
 
