@@ -154,6 +154,26 @@ def suggest_without_unit(value: object) -> str:
     return f": give a number in the unit of the run, {seconds:g} if it is s"
 
 
+def suggest_without_percent(value: object, *, is_time: bool) -> str:
+    """Explain how to write a share, or a time, that is given in percent; empty for other strings.
+
+    Examples
+    --------
+    >>> suggest_without_percent("20%", is_time=False), suggest_without_percent("20%", is_time=True)
+    (': write the share as a number, 0.2', ': give a time in the unit of the run, without %')
+    """
+    number, percent, rest = str(value).strip().partition("%")
+    if not percent or rest:
+        return ""
+    try:
+        share = float(number) / 100
+    except ValueError:
+        return ""
+    if is_time:
+        return ": give a time in the unit of the run, without %"
+    return f": write the share as a number, {share:g}"
+
+
 def check_optional_number(
     name: str, value: object, limits: Number = TIME
 ) -> float | None:

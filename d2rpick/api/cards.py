@@ -275,7 +275,9 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
         if not match:
-            if name == "--part":
+            if piece.isdecimal():
+                hint = "; an id has at most 10 digits"
+            elif name == "--part":
                 hint = "; titles need a --history that has parts"
             else:
                 hint = ""
@@ -284,6 +286,10 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
             )
         low = int(match[1])
         high = int(match[2] or match[1])
+        if low == 0:
+            raise ArgumentError(
+                f"{name}: {piece!r} does not fit, ids from 1 were expected; give those that the deck lists"
+            )
         if not low <= high < low + _MOST_IDS:
             raise ArgumentError(
                 f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"

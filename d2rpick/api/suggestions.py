@@ -337,6 +337,10 @@ def judge_pair(
         switch_times = find_switch_times(
             switched_reference.history, question.reference.history
         )
+        for time in switch_times:
+            question.reference.history.check(
+                time, subject="the switch time of the switched run,"
+            )
         tr = switch_times[0] if tr is None else tr
         td = switch_times[1] if td is None else td
     assert tr is not None

@@ -33,6 +33,7 @@ from d2rpick.choice.pair.quality import (
     ROUNDING,
     Quality,
     list_exceeded_limits,
+    omit_comparison,
     rank_candidates,
 )
 from d2rpick.choice.pair.situation import AnswerAtTd, Situation, examine_td
@@ -99,7 +100,7 @@ class PairVerdict(AnswerAtTd):
         """Decide on the pair; ``better`` is a better pair, if one is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
-        return decide(
+        decision = decide(
             self.situation,
             self.candidate,
             objections=objections,
@@ -108,6 +109,9 @@ class PairVerdict(AnswerAtTd):
             if self._is_refuted
             else CHOOSE_ANOTHER,
         )
+        if self.switched is None:
+            return decision
+        return decision._replace(quality=omit_comparison(decision.quality))
 
     @cached_property
     def better(self) -> Pair | None:
@@ -205,7 +209,7 @@ def _check_order(tr: float, td: float) -> None:
     """Raise RangeError if tr is not before td."""
     if not tr < td:
         raise RangeError(
-            f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td"
+            f"tr {tr:g} is not before td {td:g}; give the earlier time as tr"
         )
 
 
@@ -309,6 +313,15 @@ class PairSuggestion(AnswerAtTd):
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
         return better
+
+    @cached_property
+    def decision_on_better(self) -> Decision | None:
+        """Decision on the better pair by the rules of ``verify``, without another better pair; None without a pair."""
+        better = self.better_pair
+        if better is None:
+            return None
+        examined = _examine_anew(self.situation, better.td)
+        return verify_at(examined, better.tr)._decide(None)
 
     def decision_on(self, candidate: Candidate) -> Decision:
         """Decide on one of the candidates by the rules of ``verify``."""
@@ -476,6 +489,17 @@ def _is_admissible_as_printed(situation: Situation, tr: float, td: float) -> boo
 
 def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
     """Return the reason why no candidate is acceptable."""
+    earliest_tr = situation.earliest_tr
+    if (
+        situation.margin
+        and earliest_tr is not None
+        and earliest_tr >= situation.latest_td
+    ):
+        flight = situation.flight
+        return (
+            f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "
+            f"{flight.start:.6g} to {flight.end:.6g}; give a smaller `margin`"
+        )
     if not ranked:
         level = situation.energy_td
         return (

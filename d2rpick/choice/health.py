@@ -343,6 +343,8 @@ def refuse_unsound(
 ) -> None:
     """Raise RangeError if the run cannot be used at all, or if a given time seems to be in another unit.
 
+    It is also raised if the load ends outside the record according to the settings.
+
     With ``choosing`` also raise it if nothing deforms.  The given times are ``td`` or a window for it, and the start
     and end of the flight in the settings.
     """
@@ -358,6 +360,8 @@ def refuse_unsound(
             history.check_unit(
                 *(time if isinstance(time, tuple) else (time,)), argument=name
             )
+    if settings.after is not None:
+        history.check(settings.after, argument="after")
 
 
 def list_flaws(history: History) -> Iterator[Caution]:

@@ -32,6 +32,7 @@ from d2rpick.choice.switched.switched_run import (
     select_model_momenta,
 )
 from d2rpick.choice.td.flights import find_flights
+from d2rpick.flight.margin import LEAST_MARGIN
 from d2rpick.flight.momentum import replace_words_by_part_ids
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import read_balance
@@ -84,7 +85,8 @@ class Overview(NamedTuple):
     source: ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
-    show the flights for certain; None if it is written, or there is no state.
+    show the flights for certain; None if it is written, or there is no state.  ``deck`` is
+    the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.
     """
 
     source: tuple[str, ...]
@@ -106,6 +108,8 @@ class Overview(NamedTuple):
     alarms: tuple[Caution, ...] = ()
     unjudged: tuple[Caution, ...] = ()
     contact_forces: tuple[ForceOverview, ...] = ()
+    deck: str | None = None
+    selection: Selection = Selection()
 
     @property
     def verdict(self) -> str:
@@ -182,6 +186,7 @@ def describe_run(
         flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
+        flaws += tuple(_warn_about_flights_outside(history, flights))
     else:
         flaws = tuple(_warn_about_missing_energy(run, selection))
     channels = dict.fromkeys(chain.from_iterable(d.channels for d in run.databases))
@@ -216,6 +221,8 @@ def describe_run(
         contact_forces=tuple(
             ForceOverview(force.name, force.times) for force in run.contact_forces
         ),
+        deck=deck,
+        selection=selection,
     )
 
 
@@ -393,6 +400,21 @@ def _warn_about_missing_energy(
         run.history(selection)
     except FormatError as error:
         yield Caution("no-energy", str(error))
+
+
+def _warn_about_flights_outside(
+    history: History, flights: Sequence[tuple[str, FreeFlight]]
+) -> Iterator[Caution]:
+    """Yield a warning for each flight that the energies do not reach, as in files of different runs."""
+    for _, flight in flights:
+        last_td = flight.end - LEAST_MARGIN * (flight.end - flight.start)
+        if flight.end_seen and last_td > history.end:
+            span = f"from {flight.start:.6g} to {flight.end:.6g}"
+            text = f"the flight {span} reaches outside the record of the energy, which ends at {history.end:.6g}"
+            yield Caution(
+                "flight-outside-record",
+                f"{text}; do all files belong to the same run?",
+            )
 
 
 def _find_flights_to_choose_from(

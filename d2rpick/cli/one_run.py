@@ -40,7 +40,7 @@ from d2rpick.cli.output import (
 )
 from d2rpick.cli.progress import show_computing, show_reading
 from d2rpick.cli.values import CARDS
-from d2rpick.report.formats import FORMATS, write
+from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
@@ -486,7 +486,14 @@ def plan(
         if judged_card:
             output.notes(judged_card.card.notes, ())
             answer = replace(answer, fewest_cycles=judged_card.card.fewest_cycles)
-        output.answer(answer, checked if form == "table" else "", every=every)
+        output.answer(
+            answer,
+            checked if form == "table" else "",
+            every=every,
+            written_deck=WrittenDeck(write_deck, passed)
+            if write_deck and checked
+            else None,
+        )
         passed &= bool(answer.supported)
     if question.unused_deck:
         output.finish_without_deck(question.unused_deck)

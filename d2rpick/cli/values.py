@@ -64,10 +64,17 @@ class NumberType(FloatType):
         except ValueError:
             from d2rpick.api.arguments import (
                 suggest_decimal_point,
+                suggest_without_percent,
                 suggest_without_unit,
             )
 
-            hint = suggest_decimal_point(value) or suggest_without_unit(value)
+            hint = (
+                suggest_decimal_point(value)
+                or suggest_without_unit(value)
+                or suggest_without_percent(
+                    value, is_time=bool(param and param.metavar == "T")
+                )
+            )
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)

@@ -386,10 +386,15 @@ class History:
         legs = find_later_legs(self.source)
         if not legs:
             return ""
-        return f"; in the same folder is {', '.join(legs)}, a later restart segment of the run? Name it too"
+        if len(legs) == 1:
+            return f"; in the same folder is {legs[0]}, a later restart segment of the run? Name it too"
+        return f"; in the same folder are {', '.join(legs)}, later restart segments of the run? Name them too"
 
-    def check(self, *times: float, argument: str = "") -> None:
-        """Raise RangeError if a time given for ``argument`` lies outside the record."""
+    def check(self, *times: float, argument: str = "", subject: str = "") -> None:
+        """Raise RangeError unless all times are in the record.
+
+        The message names the ``argument`` that the user gave, or else describes the times as the ``subject``.
+        """
         low = self.time[0]
         high = self.time[-1]
         if all(low <= time <= high for time in times):
@@ -400,14 +405,16 @@ class History:
         hint = self.left_beside if is_late else ""
         if not hint and argument:
             hint = ask_for_smaller_unit(self.time, times, argument)
+        if not hint and subject:
+            hint = "; do all files belong to the same run?"
         hint = hint or "; give a time within it"
         if is_late and not self.complete:
             hint = f", where the file is cut{hint}"
         *values, first, last = format_distinctly((*times, low, high))
-        subject = f"`{argument}`" if argument else "time"
+        described = f"`{argument}`" if argument else subject or "time"
         verb = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(
-            f"{', '.join(self.source)}: {subject} {' '.join(values)} {verb} outside the record, "
+            f"{', '.join(self.source)}: {described} {' '.join(values)} {verb} outside the record, "
             f"{first} to {last}{hint}"
         )
 

@@ -34,11 +34,18 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 }
 
 
+class WrittenDeck(NamedTuple):
+    """The folder of a deck that was written with the cards of a plan, and whether the deck ``passed`` its check."""
+
+    folder: str
+    passed: bool
+
+
 class DisplayOptions(NamedTuple):
     """What to show in addition to the answer: the command, the number of rows, and lines that were already written.
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
-    and text are no wider than ``width`` columns.
+    and text are no wider than ``width`` columns.  ``written_deck`` is the deck that was written with the answer.
     """
 
     command: Sequence[str] = ()
@@ -47,6 +54,7 @@ class DisplayOptions(NamedTuple):
     lines: Sequence[str] = ()
     verbose: bool = False
     width: int = WIDEST
+    written_deck: WrittenDeck | None = None
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:

@@ -15,6 +15,8 @@ from d2rpick.report.situation import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from d2rpick.choice.overview import ForceOverview, Overview
     from d2rpick.flight.window import FreeFlight
     from d2rpick.report.formats import DisplayOptions
@@ -135,13 +137,30 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     if overview.verdict == DO_NOT_USE:
         cure = None if overview.unjudged else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
-    flying = any(flight.parts for _, flight in overview.flights)
-    if flying:
-        which = ["--part", "flying"]
-    else:
-        which = ["--part", "all"] if overview.parts else []
-    command = ["d2rpick", "plan", *which, *tables.make_positional(overview.source)]
+    which = [*_list_selection_options(overview)]
+    deck = ["--deck", overview.deck] if overview.deck else []
+    command = ["d2rpick", "plan", *which, *deck]
+    command += tables.make_positional(overview.source)
     return [*lines, ("next", tables.quote_shell_line(command))]
+
+
+def _list_selection_options(overview: Overview) -> Iterator[str]:
+    """Yield the options that select the same columns and parts; without chosen parts those that fly, or all."""
+    selection = overview.selection
+    if selection.time is not None:
+        yield from ("--time", selection.time)
+    for name in selection.energy:
+        yield from ("--energy", name)
+    for quantity, name in selection.channels:
+        yield from ("--channel", f"{quantity}={name}")
+    for name in selection.parts:
+        yield from ("--part", name)
+    for name in selection.flying:
+        yield from ("--flying", name)
+    if selection.energy or selection.parts or not overview.parts:
+        return
+    flying = any(flight.parts for _, flight in overview.flights)
+    yield from ("--part", "flying" if flying else "all")
 
 
 def as_markdown(overview: Overview, _: DisplayOptions) -> str:

@@ -370,7 +370,7 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
     if best is None:
         why = next(
             (part_set.reasons[0] for part_set in answer.sets if part_set.reasons),
-            "no part can be switched",
+            _explain_no_part(answer),
         )
         return [
             ("make rigid", "nothing: no set of parts can be recommended"),
@@ -398,6 +398,15 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
             f"d2rpick plan --part {format_part_ranges(best.parts)} with the same files",
         ),
     ]
+
+
+def _explain_no_part(answer: Parts) -> str:
+    """Return why no set was compared: of some parts it is unknown whether they can be switched, or none can be."""
+    unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
+    if not unknown_rows:
+        return "no part can be switched"
+    reasons = next((row.reasons for row in unknown_rows if row.reasons), ())
+    return "; ".join(["no part can be judged", *reasons])
 
 
 def _list_verdict_of_set(best: PartSet, name: str) -> list[tuple[str, str]]:

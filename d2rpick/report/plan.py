@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.base.errors import make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
-from d2rpick.report.decision import format_in_full, format_saved_share
+from d2rpick.report.decision import (
+    format_in_full,
+    format_saved_share,
+    name_card_command,
+)
 from d2rpick.report.fields import (
     Document,
     Field,
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, WrittenDeck
 
 
 # For each status of a window, in which run the parts can be switched in it.
@@ -207,7 +211,7 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
         below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
-    steps = tables.format_in_line(list_next_steps(plan), 4)
+    steps = tables.format_in_line(list_next_steps(plan, display.written_deck), 4)
     return "\n".join(
         [
             give_plan_sentence(plan),
@@ -271,19 +275,29 @@ def _name_flights(numbers: Sequence[int]) -> str:
     return f"flight{plural} {', '.join(map(str, numbers))}"
 
 
-def list_next_steps(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the next commands for the windows that can be used now, as (name, command) pairs."""
+def list_next_steps(
+    plan: RunPlan, written_deck: WrittenDeck | None = None
+) -> list[tuple[str, str]]:
+    """Return the next commands for the windows that can be used now, as (name, command) pairs.
+
+    If the deck has already been written with the cards, the next step is to run it.
+    """
     if not plan.windows:
         return []
     waiting = any(row.status == "re-plan" for row in plan.flights)
-    cards = "print the cards with -f card"
+    command = name_card_command(plan.history, plan.settings, plan.next_run)
+    cards = f"print the cards with {command}"
     if plan.done:
         cards += " (they also contain the windows that are done)"
-    rerun = "add them to the deck, and run the deck from t = 0"
+    step = f"{cards}, add them to the deck, and run the deck from t = 0"
+    if written_deck:
+        step = f"run the deck in {written_deck.folder} from t = 0"
+        if not written_deck.passed:
+            step = f"correct what the check of the written deck found, then {step}"
     again = (
         ". Then plan the remaining flights from that run (--done)" if waiting else ""
     )
-    return [("next", f"{cards}, {rerun}{again}")]
+    return [("next", f"{step}{again}")]
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
@@ -295,11 +309,11 @@ def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
     ]
 
 
-def as_markdown(plan: RunPlan, _: DisplayOptions) -> str:
+def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
     below = tables.format_as_list(
         (
-            *list_next_steps(plan),
+            *list_next_steps(plan, display.written_deck),
             *list_verdicts(plan),
             *list_plan_remarks(plan),
             *list_reasons(plan),

@@ -11,6 +11,7 @@ from d2rpick.choice.runs.study import (
     OK,
     StudyOfRuns,
     StudyRow,
+    describe_end_of_record,
     find_cut_runs,
     find_repeated_runs,
     format_number_of_runs,
@@ -186,8 +187,8 @@ def add_errors(answer: StudyOfRuns) -> Iterator[tuple[StudyRow, float | None]]:
 
 def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and cells of the runs."""
-    cut = {
-        row.source: f"cut at {row.record_end:g}; " for row in find_cut_runs(answer.runs)
+    ends = {
+        row.source: describe_end_of_record(row) for row in find_cut_runs(answer.runs)
     }
     has_failures = any(row.status != OK for row in answer.runs)
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
@@ -209,14 +210,23 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
         "status": lambda run_and_error: (
             run_and_error[0].status if has_failures else None
         ),
-        "why": lambda run_and_error: (
-            cut.get(run_and_error[0].source, "")
-            + (
-                run_and_error[0].message or ", ".join(run_and_error[0].warnings)
-            ).removeprefix(f"{run_and_error[0].source.rstrip('/')}: ")
+        "why": lambda run_and_error: "; ".join(
+            filter(
+                None,
+                (
+                    ends.get(run_and_error[0].source),
+                    _explain_status(run_and_error[0]),
+                ),
+            )
         ),
     }
     return tables.fill_table(columns, add_errors(answer))
+
+
+def _explain_status(row: StudyRow) -> str:
+    """Return the message of a run without its name, or else the codes of its warnings; empty without either."""
+    text = row.message or ", ".join(row.warnings)
+    return text.removeprefix(f"{row.source.rstrip('/')}: ")
 
 
 def name_target_energy(answer: StudyOfRuns) -> str:

@@ -16,6 +16,7 @@ from d2rpick.report.decision import (
     list_numbered_reasons,
     list_statements,
     list_verdict_lines,
+    name_card_command,
     number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
@@ -169,13 +170,18 @@ def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
     if best and decision:
         lines = list_verdict_lines(decision, best.tr, answer.td)
     if better and not (decision and decision.better):
-        lines.append(
-            (
-                "better pair",
-                f"{_format_times(better)}: {describe_improvement(answer, better)}",
-            )
-        )
+        lines.append(("better pair", _judge_better_pair(answer, better)))
     return lines
+
+
+def _judge_better_pair(answer: PairSuggestion, better: Pair) -> str:
+    """Return the better pair with its verdict; one that cannot be used is named only as such."""
+    decision = answer.decision_on_better
+    if decision is None:
+        return f"{_format_times(better)}: {describe_improvement(answer, better)}"
+    if decision.verdict == DO_NOT_USE:
+        return f"{_format_times(better)}: {DO_NOT_USE} it, because {decision.reason}"
+    return f"{_format_times(better)}: {decision.verdict}; {describe_improvement(answer, better)}"
 
 
 def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
@@ -199,10 +205,14 @@ def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
     decision = answer.decision
     if decision is None or decision.verdict == DO_NOT_USE:
         return []
+    situation = answer.situation
+    pair = answer.recommended
+    windows = [(pair.tr, pair.td)] if pair else []
+    command = name_card_command(situation.history, situation.settings, windows)
     return [
         (
             "next",
-            "print the cards with -f card, or a page of the evidence with --report FILE",
+            f"print the cards with {command}, or a page of the evidence with --report FILE",
         )
     ]
 

@@ -95,6 +95,11 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "large an error. The warning gives the reason for the nearest candidate.",
             "Omit --td, compare other values of td with d2rpick explore, or choose other parts.",
         ),
+        "flight-outside-record": Explanation(
+            "The momenta show a flight that lasts longer than the record of the energy. The files may belong to "
+            "different runs, or one of them was cut.",
+            "Give the files of one run only, or copy the shorter file again.",
+        ),
         "no-energy": Explanation(
             "The internal energy at td is zero or negative, so there is no level to match.",
             "Check the energy that d2rpick reads (d2rpick info). Choose another td, or select the energy with "

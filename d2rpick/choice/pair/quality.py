@@ -235,6 +235,10 @@ def list_exceeded_limits(
     return tuple(exceeded)
 
 
+# Last part of a cure; it is left out if the switched run is already there.
+_OR_COMPARE: Final = ", or compare with a finished switched run"
+
+
 class Cause(NamedTuple):
     """The ``reason`` why a grade is not better, and the ``cure`` that would improve it.
 
@@ -385,8 +389,25 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
         cures.append(for_modes)
     return Cause(
         f"{unknown}{why}",
-        f"{', '.join(cures)}, or compare with a finished switched run",
+        f"{', '.join(cures)}{_OR_COMPARE}",
         kind=unknown,
+    )
+
+
+def omit_comparison(quality: Quality) -> Quality:
+    """Return the grades without the advice to compare with a finished switched run, because this has been done."""
+
+    def omit(grade: Grade) -> Grade:
+        causes = [
+            cause._replace(cure=cause.cure.removesuffix(_OR_COMPARE))
+            for cause in grade.causes
+        ]
+        return grade._replace(causes=tuple(causes))
+
+    return quality._replace(
+        motion=omit(quality.motion),
+        vibration=omit(quality.vibration),
+        alone=omit(quality.alone),
     )
 
 
@@ -411,7 +432,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
-        return f"also give {names} in `parts`, because {vibrates} together with the chosen parts"
+        return f"also make {names} rigid, because {vibrates} together with the chosen parts"
     return _MORE_OFTEN
 
 
@@ -422,13 +443,13 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     if share is None or share <= POOR_KINETIC_SHARE:
         return Cause(
             reason,
-            "look for another tr or td with d2rpick explore",
+            "see with d2rpick explore whether another tr or td is better",
             needs_other_times=True,
             kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}",
         )
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "look for another td with d2rpick explore",
+        "see with d2rpick explore whether another td is better",
         needs_other_times=True,
         kind="most of the vibration energy is kinetic at td, which no tr can keep",
     )
@@ -490,7 +511,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "look for another td with d2rpick explore",
+                "see with d2rpick explore whether another td is better",
                 needs_other_times=True,
                 kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )

@@ -356,6 +356,13 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     ]
 
 
+def describe_end_of_record(row: StudyRow) -> str:
+    """Return how the record of a run from `find_cut_runs` ends: within a state, or earlier than most others."""
+    if "truncated-input" in row.warnings:
+        return f"cut at {row.record_end:g}"
+    return f"ends early, at {row.record_end:g}"
+
+
 def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
     """Return the groups of judged runs that were read from the same files, or from files with the same content."""
     # The contents of files are compared only if the sizes of the files and the answers for the runs are equal.
@@ -407,11 +414,14 @@ def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Cauti
             "runs-left-out",
             f"{text} and are left out: {list_names(left_out, most=NAMED)}",
         )
-    cut = [f"{row.source} (at {row.record_end:g})" for row in find_cut_runs(rows)]
+    cut = [
+        f"{row.source} ({describe_end_of_record(row)})" for row in find_cut_runs(rows)
+    ]
     if cut:
+        count = f"{len(cut)} of {format_number_of_runs(len(rows))}"
         yield Caution(
             "cut-runs",
-            f"{len(cut)} of {format_number_of_runs(len(rows))} were cut: {list_names(cut, most=NAMED)}",
+            f"{count} were cut, or end earlier than most: {list_names(cut, most=NAMED)}",
         )
     if common.keeps_tolerance is False:
         text = f"tr = {common.tr:g} is admissible in all runs, but no tr is within the timing tolerance of every run"

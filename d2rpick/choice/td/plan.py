@@ -298,6 +298,7 @@ def _suggest_window(
         flight_settings = replace(flight_settings, landing=None)
     # At a td the energy alone may not show the end of the flight, so the margin before the listed end is kept.
     window = row.start, compute_last_td(row.end, row.margin.time)
+    reference.history.check(*window, subject=f"flight {row.number},")
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
     known_flight = answer.situation.flight
     row = row._replace(answer=answer)

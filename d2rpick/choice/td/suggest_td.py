@@ -153,7 +153,9 @@ def choose_td(
     RangeError
         If the window lies outside the record, or if no window is given and nothing shows a flight.
     """
-    window = window or find_longest_flight(history, settings)
+    if window is None:
+        window = find_longest_flight(history, settings)
+        history.check(*window, subject="the longest flight,")
     look = make_look(history, settings, since)
     situation, inside = find_best_known(look, history, window)
     choose = _choose_by_level if situation.vibration.unknown else _choose_by_residual

@@ -251,6 +251,8 @@ def explore_run(
     window = td_window or find_longest_flight(
         history, settings, otherwise=None if td is None else record
     )
+    if td_window is None:
+        history.check(*window, subject="the longest flight,")
     look = make_look(history, settings, since)
     known_best, inside = find_best_known(look, history, window)
     offered, peaks = list_offered_times(known_best, inside, steps)

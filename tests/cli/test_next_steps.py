@@ -1,0 +1,152 @@
+"""The next step that an answer names can be taken, and messages name only what the user gave."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
+from tests.command import (
+    BOX,
+    ENERGY,
+    MATSUM,
+    ROLLOVER,
+    ROOT,
+    join_wrapped_lines,
+    run,
+    run_json,
+)
+
+SAMPLES = ROOT / "sample_data"
+DECK = str(SAMPLES / "rollover_box.k")
+
+
+def find_line(name: str, *arguments: str) -> str:
+    """Return the sentence that the table of an answer gives under a name, in one line."""
+    text = run(*arguments).stdout
+    match = re.search(rf"^{name}  .*(?:\n  .*)*", text, re.MULTILINE)
+    assert match, text
+    return " ".join(match[0].removeprefix(name).split())
+
+
+@pytest.mark.parametrize("command", ["suggest", "plan"])
+def test_the_step_to_the_card_names_the_option_that_the_card_needs(
+    command: str,
+) -> None:
+    text = find_line("next", command, ENERGY)
+    match = re.search(r"with d2rpick (card .*) \(IDS", text)
+    assert match
+    card = run(*shlex.split(match[1].replace("IDS", "1")))
+    assert card.exit_code == 0
+    assert "*DEFORMABLE_TO_RIGID" in card.stdout
+
+
+def test_the_step_to_the_card_of_a_radioss_run_names_the_nodes() -> None:
+    text = find_line("next", "suggest", "--part", "flying", BOX)
+    assert "-f card --node IDS" in text
+
+
+def test_after_the_deck_is_written_the_next_step_is_to_run_it(tmp_path: Path) -> None:
+    folder = str(tmp_path / "next")
+    options = ("--part", "1,2", "--deck", DECK, "--write-deck", folder)
+    text = find_line("next", "plan", *options, MATSUM)
+    assert text.startswith(f"run the deck in {folder} from t = 0")
+
+
+def test_the_step_after_info_keeps_the_deck() -> None:
+    assert f"--deck {DECK}" in find_line("next", "info", "--deck", DECK, MATSUM)
+
+
+def test_the_step_after_info_keeps_the_selected_energy() -> None:
+    text = find_line("next", "info", "--energy", "boxIE_J", ROLLOVER)
+    assert text == f"d2rpick plan --energy boxIE_J {ROLLOVER}"
+    step = run(*shlex.split(text)[1:])
+    assert step.exit_code in (0, 1)
+    assert "flight" in step.stdout
+
+
+def test_info_refuses_files_whose_flight_lasts_longer_than_the_energy() -> None:
+    result = run("info", MATSUM, ENERGY)
+    text = join_wrapped_lines(result.stdout)
+    assert text.startswith("verdict do not use why the flight from 0.086 to 0.379")
+    assert "do all files belong to the same run?" in text
+    assert "next" not in text.split("source")[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cause"),
+    [
+        (("suggest", "--after", "0.5", MATSUM), "--after 0.5 lies outside the record"),
+        (("explore", "--after", "0.5", MATSUM), "--after 0.5 lies outside the record"),
+        (
+            ("suggest", MATSUM, ENERGY),
+            "the longest flight, 0.086 0.379 reaches outside",
+        ),
+        (("plan", MATSUM, ENERGY), "flight 1, 0.086 "),
+        (
+            ("explore", MATSUM, ENERGY),
+            "the longest flight, 0.086 0.379 reaches outside",
+        ),
+        (
+            ("parts", "--deck", str(SAMPLES / "oscillator"), MATSUM),
+            "this is a folder; give the main deck in it",
+        ),
+        (
+            ("verify", "--tr", "0.0687534", "--td", "0.0135867", ENERGY),
+            "give the earlier time as tr",
+        ),
+        (("suggest", "--margin", "50%", ENERGY), "give a time in the unit of the run"),
+        (("suggest", "--tolerance", "20%", ENERGY), "write the share as a number, 0.2"),
+        (
+            ("card", "--tr", "0.1", "--td", "0.2", "--part", "99999999999"),
+            "an id has at most 10 digits",
+        ),
+        (("card", "--tr", "0.1", "--td", "0.2", "--part", "0"), "--part: '0' does not"),
+    ],
+)
+def test_a_refusal_names_what_was_given_and_the_cure(
+    arguments: tuple[str, ...], cause: str
+) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert cause in result.stderr
+
+
+def test_a_margin_longer_than_the_flight_is_named_as_the_reason() -> None:
+    text = find_line("no pair to use", "suggest", "--margin", "1", MATSUM)
+    assert text.startswith("the margin 1 after the load and before the contact leaves")
+    assert text.endswith("give a smaller --margin")
+
+
+def test_without_part_energies_no_part_is_called_unable_to_be_switched() -> None:
+    text = find_line("why", "parts", "--deck", DECK, ENERGY)
+    assert text.startswith("no part can be judged; ")
+
+
+def test_a_better_pair_that_verify_refuses_is_not_offered() -> None:
+    options = ("--part", "box", MATSUM)
+    text = find_line("better pair", "suggest", "--td", "0.064", *options)
+    better = run_json("suggest", "--td", "0.064", *options)["better_td"]
+    times = ("--tr", repr(better["tr"]), "--td", repr(better["td"]))
+    assert run_json("verify", *times, *options)["verdict"] == "do not use"
+    assert text.startswith(
+        f"tr = {better['tr']:.6g}, td = {better['td']:.6g}: do not use it"
+    )
+
+
+def test_a_complete_run_is_not_called_cut_because_another_is_longer() -> None:
+    result = run("study", "--part", "flying", MATSUM, BOX)
+    assert "ends early, at 0.42" in join_wrapped_lines(result.stdout)
+    assert "cut at" not in result.stdout
+    assert ";\n" not in result.stdout
+
+
+def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
+    cause = Cause(
+        "unknown", "write more often, or compare with a finished switched run"
+    )
+    grade = Grade("poor", (cause,))
+    quality = omit_comparison(Quality(grade, grade, grade))
+    cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
+    assert cures == {"write more often"}
