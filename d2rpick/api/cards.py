@@ -412,7 +412,7 @@ def card(
     windows : pairs of float
         tr and td of each [time].
     run : Run, optional
-        As `read` gives it, without switching.
+        The run, opened with `read`; it must not be switched.
     parts : number or several, optional
         The parts to be switched; with a run that has parts by title too.
     **options

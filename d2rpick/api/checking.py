@@ -100,7 +100,7 @@ def check(
     decks : path or several
         Main decks, read with their includes; a folder stands for its main decks, ``-`` for standard input.
     history : Run, optional
-        By which the windows are judged: a run without switching.
+        The run by whose history the windows are judged; it must not be switched.
     select, ignore : string or several
         Rules by id or its beginning; default: by the configuration nearest to the deck.
     **choosing

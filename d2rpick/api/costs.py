@@ -89,7 +89,7 @@ def parts(
     Parameters
     ----------
     run : Run
-        As `read` gives it, without switching.
+        The run, opened with `read`; it must not be switched.
     deck : path, optional
         Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.  Default: the only main deck in the
         folder that was read; False for none.

@@ -105,7 +105,7 @@ def explore(
     Parameters
     ----------
     run : Run
-        As `read` gives it, without switching.
+        The run, opened with `read`; it must not be switched.
     td : float or text, optional
         A td to explore too, with which the others are compared [time].
     td_window : (float, float), optional
@@ -191,7 +191,7 @@ class Plan(RunAnswer, planning.RunPlan):
     ) -> JudgedCard | None:
         """Print the card for the next run, and judge the windows with the times as printed.
 
-        It contains all new windows if ``every`` is True, else only the windows that the history supports.
+        The card contains all new windows if ``every`` is True, else only the windows that the history supports.
         """
         return self.printed(
             Cards.for_run(self.question.run, options),
@@ -258,7 +258,7 @@ def plan(
     Parameters
     ----------
     run : Run
-        As `read` gives it: without switching, or switched in the windows that are ``done``.
+        The run, opened with `read`; it must not be switched, except in the windows that are ``done``.
     parts, flying, deck, weights, **choosing
         As for `suggest`.
     min_rigid : float or text, optional

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class Run:
     """One run: its opened files, and the named columns of a table; it is immutable.
 
-    It can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.  Two
-    runs are equal if the same bytes were read under the same names, in the same way.
+    A run can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.
+    Two runs are equal if the same bytes were read under the same names, in the same way.
 
     ``files`` are the opened files, ``chosen`` the columns, ``input_format`` the format as which the files were read,
     ``"auto"`` if their content decided.  ``folder`` is the folder that was named; the main deck is searched there.

@@ -180,7 +180,7 @@ def suggest(
     Parameters
     ----------
     run : Run
-        As `read` gives it, without switching.
+        The run, opened with `read`; it must not be switched.
     td : float or text
         When the parts are switched back [time]; a string with a unit, such as ``"64ms"``, if the run names its own.
     td_window : (float, float)
@@ -268,7 +268,7 @@ def verify(
     Parameters
     ----------
     run : Run
-        As `read` gives it, without switching.
+        The run, opened with `read`; it must not be switched.
     tr, td : float or text
         Switch times [time], or strings such as ``"64ms"``; with ``switched`` they are read off that run where they are
         not given.

@@ -22,7 +22,8 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 class Memory:
     """Results of remembered functions for one record, by function and arguments.
 
-    It lives as long as the record, which is read anew for each question.  A copy in another process starts empty.
+    The memory lives as long as the record, which is read anew for each question.  A copy in another process starts
+    empty.
     """
 
     def __init__(self) -> None:

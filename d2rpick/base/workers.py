@@ -145,7 +145,7 @@ class Cores(Farm):
         try:
             return _make_answer(number, future)
         finally:
-            # Without wait=False, an interrupt would take effect only after the call.
+            # With wait=True, an interrupt would take effect only after the call.
             pool.shutdown(wait=False)
 
     def _begin_pool(

@@ -225,7 +225,7 @@ class AcceptableWindow(NamedTuple):
 class PairSuggestion(AnswerAtTd):
     """The answer of ``suggest``: ranked candidates, the recommended pair, a better pair at another td, and warnings.
 
-    ``td_window`` is the window in which td was chosen, None for a given td; ``compared_td`` is the part of it in which
+    ``td_window`` is the window in which td was chosen, None if td was given; ``compared_td`` is the part of it in which
     all td were compared, since they keep the margin.  ``longer`` is the longest acceptable pair in the window, if much
     rigid time was given up for quality.
     """

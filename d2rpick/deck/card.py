@@ -113,7 +113,7 @@ class Row:
     def field(self, position: int) -> CardField:
         """Return the field at the 0-based ``position``; fields are separated by commas or have fixed columns.
 
-        It is empty beyond the end of the line.
+        The text is empty beyond the end of the line.
         """
         pieces = self._pieces()
         comma = int("," in self.text)
@@ -264,7 +264,7 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; return None for any other number, and in an include file with other units."""
+        """Read a positive number; return None if it is not positive, or if its include file has other units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
@@ -336,7 +336,7 @@ class Scope:
     def definitions(self, name: str) -> tuple[Definition, ...]:
         """Return all definitions of ``name`` (lower case), including later ones.
 
-        They come from the innermost scope that has one before the current position.
+        The definitions come from the innermost scope that has one before the current position.
         """
         by_scope = [table[name] for table in self._tables() if name in table]
         return tuple(
@@ -417,7 +417,7 @@ class Scope:
     ) -> Definition | None:
         """Evaluate one definition of a parameter.
 
-        ``name_field`` is the type letter with the name. Return None for another type letter.
+        ``name_field`` is the type letter with the name. Return None if the type letter is another one.
         """
         kind = name_field[:1].upper()
         name = name_field[1:].strip().lstrip("&").strip().lower()

@@ -53,9 +53,9 @@ class ForceTiming(NamedTuple):
 def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
     """Return the times of a pair of LS-DYNA switch sets that makes parts rigid in planned windows.
 
-    It makes parts rigid when no force has acted for the wait (the force-free time that shows a flight), and deformable
-    shortly before the next force. OFFSET is the distance that the parts fly from td of the first window to the contact
-    after it.
+    The switch makes parts rigid when no force has acted for the wait (the force-free time that shows a flight), and
+    deformable shortly before the next force. OFFSET is the distance that the parts fly from td of the first window to
+    the contact after it.
 
     Raises
     ------

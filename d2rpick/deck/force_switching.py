@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class ForceSwitch(NamedTuple):
     """A switch set that waits for a force (``with_force`` is True), or for the absence of a force.
 
-    It acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
+    The set acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
     turn.
     """
 
@@ -44,7 +44,7 @@ def follow_pair(
     Parameters
     ----------
     first, second : ForceSwitch
-        The set that acts first, and its pair; None for a single set, which switches once.
+        The set that acts first, and its pair; a single set has no pair (None) and switches once.
     contacts : sequence of (float, float)
         Spans in which a contact force acts, ascending [time].
     end : float

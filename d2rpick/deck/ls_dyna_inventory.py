@@ -389,7 +389,7 @@ def _read_elements(
 def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
     """Join each line that contains element id and part id with the line of nodes below it.
 
-    Also return a last line that lacks its nodes.
+    Return also a last line whose nodes are missing.
     """
     heads = (values[:, :2] > 0).all(axis=1) & (values[:, 2:] == 0).all(axis=1)
     if not heads.any():

@@ -100,7 +100,7 @@ def follow_control(
     Returns
     -------
     list of Change or str
-        Its state at the start and all changes in order, or the reason why they are unknown.
+        The state of the control at the start and all changes in order, or the reason why they are unknown.
     """
     if control.initial not in ("ON", "OFF"):
         return f"a control whose INITSTT is {control.initial!r}, not ON or OFF"

@@ -175,7 +175,8 @@ class Formulation(NamedTuple):
 class Material(NamedTuple):
     """A material of a deck: its keyword, its kind, and its elastic constants.
 
-    Its keyword, ``kind`` ("deformable", "rigid", "spring", "airbag" or "void"), and its elastic constants.
+    The fields are its keyword, ``kind`` ("deformable", "rigid", "spring", "airbag" or "void"), and its elastic
+    constants.
 
     Numbers are None if the deck does not define them in a way that can be read.
     """

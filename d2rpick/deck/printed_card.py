@@ -46,7 +46,7 @@ class Printing(NamedTuple):
     node : tuple of int
         Main nodes of the rigid bodies to switch, for solvers that switch bodies.
     off : tuple of int
-        Main nodes of further rigid bodies, which stay off in all legs.
+        Main nodes of further rigid bodies, which stay inactive in all engine runs.
     merge : int, optional
         Lead part into which all others are merged; if it is missing, each part becomes a separate rigid body.
     bodies : tuple of tuple of int, optional

@@ -406,7 +406,8 @@ def _write_sensors(
 ) -> tuple[str, int]:
     """Return the text of sensors, whose ids begin with ``first``, and the id of the sensor that combines all of them.
 
-    It is active in each of ``spans``, and while a ``force`` acts, given by the arguments of `write_force_sensor`.
+    The combining sensor is active in each of ``spans``, and while a ``force`` acts, given by the arguments of
+    `write_force_sensor`.
     """
     from d2rpick.deck.sensor_cards import (
         write_any_of,

@@ -78,8 +78,8 @@ def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
     """Find the rigid bodies of given parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
-    is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first leg has to
-    deactivate them.
+    is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first engine run has
+    to deactivate them.
 
     Parameters
     ----------

@@ -251,7 +251,8 @@ def _check_velocities(
 ) -> Iterator[Flaw]:
     """Yield the flaws of bodies whose nodes have an initial velocity while their main node is in no /INIVEL.
 
-    The starter gives all nodes of a body the velocity of its main node, even if the first leg deactivates the body.
+    The starter gives all nodes of a body the velocity of its main node, even if the first engine run deactivates the
+    body.
     """
     velocities: list[tuple[Card, int, frozenset[int]]] = []
     for card in starter.named("INIVEL"):

@@ -132,8 +132,8 @@ def _add_main_nodes(
 ) -> Iterator[Body]:
     """Yield the bodies with their main nodes, some of which the starter adds.
 
-    These are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the order of
-    the parts in the deck, as their ids are above all others.
+    The added nodes are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the
+    order of the parts in the deck, as their ids are above all others.
     """
     lacking = sorted(
         (body for body in in_deck if not body.node.value),

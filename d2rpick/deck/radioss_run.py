@@ -201,7 +201,7 @@ class RunWindows:
 def is_in_order(legs: list[RadiossLeg]) -> bool:
     """Return True if no engine run is missing from the first to the last, and each ends at a known time.
 
-    No leg may end before the previous one.
+    No engine run may end before the previous one.
     """
     if any(leg.sensor for leg in legs[:-1]):
         return False
@@ -222,9 +222,9 @@ def find_run_windows(
 ) -> RunWindows:
     """Return the windows of every body that an engine run or a sensor switches.
 
-    A body with unknown parts is one unit, named by its main node.  If the legs are not in order there are no windows.
-    For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
-    in which an interface or wall has a force; None if no history shows them.
+    A body with unknown parts is one unit, named by its main node.  If the engine runs are not in order, there are no
+    windows. For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and
+    ``forces`` those in which an interface or wall has a force; None if no history shows them.
     """
     sets = tuple(_list_switches(run.legs)) if is_in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -438,7 +438,7 @@ def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
 def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
     """Return the parts of the bodies that are always on, because no engine run and no sensor switches them.
 
-    Without engine files all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
+    If there are no engine files, all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
     bodies = run.starter.bodies if run.starter and not run.starter.moved else ()
     fixed = [

@@ -121,7 +121,7 @@ class SwitchSet:
     def time_field(self) -> CardField:
         """Return the field that contains the switching time; if the card has no such field, return the keyword.
 
-        It is TIME1, or the end of the run before a restart.
+        This time is TIME1, or the end of the run before a restart.
         """
         if self.restart:
             return self.restart.stop_field

@@ -1,6 +1,6 @@
 """Write a deck with switching cards into another folder, ready to run.
 
-For a driven Radioss run, engine files are written leg by leg.
+For a driven Radioss run, engine files are written one engine run at a time.
 """
 
 from __future__ import annotations
@@ -316,7 +316,7 @@ def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
 def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
     """Return a file of the starter deck in which sensors switch bodies; ``sensors`` are given by main node.
 
-    Its /BEGIN gets a version in which time sensors have an end.
+    The /BEGIN of the file gets a version in which time sensors have an end.
 
     Raises
     ------
@@ -484,7 +484,8 @@ def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     Parameters
     ----------
     path : str
-        Its starter deck or an engine file; of several engine files the first defines the output, the last the end.
+        The starter deck of the run or an engine file; of several engine files the first defines the output, the last
+        the end.
     parts : collection of int
         Parts to switch; default: the parts of the bodies that the first engine file deactivates.
 

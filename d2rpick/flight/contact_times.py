@@ -89,7 +89,7 @@ def narrow_to_states(
     """Return the first state at or after ``tr`` and the last state at or before ``td`` [time].
 
     A sensor switches at the first or last contact force, which is somewhere between two states.  The flight is certain
-    only between states without a force.  If there is no state between ``tr`` and ``td``, both times are kept.
+    only between states at which no force acts.  If there is no state between ``tr`` and ``td``, both times are kept.
 
     Examples
     --------

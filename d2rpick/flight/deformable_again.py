@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 def restore_parts(history: History, flight: Flight) -> tuple[History, Flight]:
     """Return the record and a flight of the whole model with the parts that move in it, if they are deformable.
 
-    Both are returned unchanged if the flight has parts, or if a rigid body has absorbed parts in one of its states.
-    The momenta of the parts are those of the states around the flight in which no part is absorbed.
+    Record and flight are returned unchanged if the flight has parts, or if a rigid body has absorbed parts in one of
+    its states. The momenta of the parts are those of the states around the flight in which no part is absorbed.
     """
     written = history.evidence.written
     if written is None or flight.parts is not None:

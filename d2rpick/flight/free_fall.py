@@ -314,8 +314,8 @@ class Laws:
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Return True if a constant force (3,) is friction rather than gravity, because it only slows the parts down.
 
-        Its size may be that of gravity by chance, or because the coefficient of friction is 0.1.  Therefore gravity
-        must act along an axis, and in a straight motion with its value in m, mm, s or ms.
+        The force may have the size of gravity by chance, or because the coefficient of friction is 0.1.  Therefore
+        gravity must act along an axis, and in a straight motion with its value in m, mm, s or ms.
         """
         size = float(np.linalg.norm(force))
         along = force / size

@@ -128,8 +128,8 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 def find_landing_after(history: History, start: float) -> float | None:
     """Return the first time after ``start`` at which the energy quickly leaves its former range [time], or None.
 
-    It is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's width: no
-    vibration goes so far beyond its range of so long a time.
+    The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
+    width: no vibration goes so far beyond its range of so long a time.
     """
     time, energy = history.between(start, np.inf)
     if time.size < FEWEST:

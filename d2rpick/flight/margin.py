@@ -191,8 +191,8 @@ def is_grazing(history: History, flight: Flight, within: float) -> bool:
 def changes_momentum_little(history: History, flight: Flight) -> bool:
     """Return True if the contact that ends a flight takes less than 10 % of the momentum towards it.
 
-    It is over when its force stays below 1 % of the largest one for three states.  The impulse is the change of
-    momentum less gravity.  False if the record ends before that, or momenta do not show the force.
+    The contact is over when its force stays below 1 % of the largest one for three states.  The impulse is the change
+    of momentum less gravity.  False if the record ends before that, or momenta do not show the force.
     """
     contact = _find_contact(history, flight)
     evidence = select_momenta_of_flight(history, flight)
@@ -345,7 +345,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 def compute_closing_speed(history: History, flight: Flight) -> float | None:
     """Return the speed along gravity at the end of a flight, negative for a body that rises [length/time].
 
-    Without gravity it is the whole speed.  None if the momentum or the mass is unknown.
+    If there is no gravity, the result is the whole speed.  None if the momentum or the mass is unknown.
     """
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:

@@ -47,7 +47,7 @@ _LONGER = 1.1
 # _CANCELS: the sum of the momenta of a body deviates from a straight line by less than this share [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # A decrease of the summed deviation by less than this share is treated as rounding error [-].
-# Without this limit, the search could add and remove a part of almost no mass endlessly.
+# This limit keeps the search from endlessly adding and removing a part of almost no mass.
 _ROUNDED: Final = 1e-9
 # A set of parts is at rest or held if its final speed is below this share of its largest momentum.
 _HELD = 0.01

@@ -91,8 +91,8 @@ class Drift:
     def at_least(self) -> bool:
         """Return True if errors and angles are lower bounds, because internal motion looks like motion of the body.
 
-        This is so if the part moves slowly, or if the motion of the others turns their frame by more than the body's
-        own angle, or, if there is no deck, moves them by a notable share of the part's motion.
+        This happens if the part moves slowly, or if the motion of the others turns their frame by more than
+        the body's own angle, or, if there is no deck, moves them by a notable share of the part's motion.
         """
         moved = float(
             np.sqrt(
@@ -494,7 +494,7 @@ def _find_drift_of_body(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Return the displacement of a body whose parts have energy; None for a single flying part."""
+    """Return the displacement of a body whose parts have energy; None if only a single part flies."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

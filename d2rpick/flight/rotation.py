@@ -115,7 +115,7 @@ def _fit_steady_rotation(
 
 
 def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
-    """Return the displacements (n, parts, 3) in the rotating frame, without their mean and the circular motion.
+    """Return the displacements (n, parts, 3) in the rotating frame, minus their mean and the circular motion.
 
     The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """

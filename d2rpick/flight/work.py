@@ -55,9 +55,9 @@ def compute_work_beyond_gravity(
 ) -> float | None:
     """Return the largest external work in a window that neither gravity nor damping explains [energy].
 
-    Both factors have a sign: gravity acts along the mean change of the momentum, and damping takes energy.  If no
-    velocity is written, the work of gravity is an upward parabola of time.  Errors of digits and of the solver's sums
-    are subtracted.  None if the work is not written, or the window has too few states.
+    The factors of gravity and damping have a sign: gravity acts along the mean change of the momentum, and damping
+    takes energy.  If no velocity is written, the work of gravity is an upward parabola of time.  Errors of digits and
+    of the solver's sums are subtracted.  None if the work is not written, or the window has too few states.
     """
     inside = find_window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:

@@ -98,7 +98,7 @@ def join_contact_forces(
 ) -> ContactForce:
     """Join the forces of one contact in all restart segments of a run; ``keep`` marks the valid states.
 
-    Between two legs the force acts if it acts just before or after.
+    Between two restart segments the force acts if it acts just before or after.
     """
     if len(pieces) == 1 and keep.all():
         return pieces[0]

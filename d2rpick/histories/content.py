@@ -98,9 +98,9 @@ class OnDisk(Content):
     name : str
         Name of the file, for messages.
     file : int
-        Its descriptor, which is closed with this object.
+        Descriptor of the file, which is closed with this object.
     state : FileState
-        Its state at rest.
+        State of the file when no write is pending.
     """
 
     # Sizes of the pieces of a file that are read at once [bytes].
@@ -280,7 +280,7 @@ class OnDisk(Content):
 class Scattered(OnDisk):
     """The bytes of a file that is read at a few scattered offsets.
 
-    The file is opened for each reading: a run may have written more such files than a process may have open.
+    The file is opened for each request, since a run may have written more such files than a process may have open.
     """
 
     window = 1 << 12

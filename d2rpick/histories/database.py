@@ -71,7 +71,7 @@ class Database:
     version, title : str
         Solver and release as far as the file names them; title of the run.
     complete : bool
-        True if the file ends after a whole state and no state before is missing.
+        True if the file ends after a complete state and no state before is missing.
     notes : tuple of str
         Notes for the user on what was read.
     channels : tuple of str
@@ -166,8 +166,8 @@ class Database:
 class Legs:
     """The restart segments of one run, in order, as one `Database`; in overlaps the newer segment is used.
 
-    A single leg needs this too if a restart wrote states again, or if printed times are equal. Legs without any state
-    are used only if all legs have none.
+    A single segment needs this too if a restart wrote states again, or if printed times are equal. Segments that have
+    no states are used only if no segment has states.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 # An energy belongs to several parts if it varies this many times more from row to row than noise explains.
-# Without noise, a single energy varies as much from row to row as from time to time.
+# If there is no noise, a single energy varies as much from row to row as from time to time.
 # Noise multiplies the variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000

@@ -96,7 +96,7 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 def find_ending(history: str) -> str | None:
     """Return how a run ended, according to the listing of its last history; None if it is unknown.
 
-    A leg that was told to stop has not ended the run, nor has a leg with a next leg.
+    A restart segment that was told to stop has not ended the run, nor has one that another segment follows.
     """
     from pathlib import Path  # Imported here to keep start-up fast.
 

@@ -1,6 +1,6 @@
 """Recognise the quantity of a column, curve or dataset by its name in tables, HDF5 and solver databases.
 
-A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are searched among these words,
+A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are compared with these words,
 the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
 any other word the column contains the quantity of something else, such as a part ("Kinetic energy of the door").
 """

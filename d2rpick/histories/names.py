@@ -218,7 +218,7 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
     """Return a question with the most similar name, or an empty string; ``likeness`` (0 to 1) is the least similarity.
 
-    Without a similar name, the only one that begins with the wanted string is proposed.
+    If no name is similar, the only name that begins with the wanted string is proposed.
 
     Examples
     --------

@@ -389,8 +389,8 @@ def check_companions(databases: Sequence[Legs]) -> None:
 def check_legs(legs: Sequence[Database]) -> None:
     """Raise FormatError if files of one format belong to different runs.
 
-    All legs of a run have the same quantities. A restart repeats the state with which it begins. Files that begin at
-    the same time are copies, or of different runs: then all states at common times are compared.
+    All restart segments of a run have the same quantities. A restart repeats the state with which it begins. Files that
+    begin at the same time are copies, or of different runs: then all states at common times are compared.
     """
     for first, second in combinations(legs, 2):
         held_by_first = _list_columns_and_parts(first)

@@ -217,7 +217,7 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer in the form of its schema. Without ``indent`` it is one line, for newline-delimited JSON."""
+        """Write an answer in its schema, as one line (newline-delimited JSON) if ``indent`` is not given."""
         return tables.as_json(self.of(answer, command), indent)
 
 

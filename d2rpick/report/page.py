@@ -149,8 +149,8 @@ def build_document(
 def _make_policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
     """Return the content security policy: nothing is fetched, and only the page's own scripts and styles are used.
 
-    This applies whatever the input files contain.  Drawings have their styles in attributes.  Older browsers support
-    only one rule for all styles.
+    The policy applies whatever the input files contain.  Drawings have their styles in attributes.  Older browsers
+    support only one rule for all styles.
     """
     allowed = {"style-src-elem": styles, "script-src": scripts}
     rules = [

@@ -341,8 +341,8 @@ def as_csv(plan: RunPlan, _: DisplayOptions) -> str:
 def as_value(plan: RunPlan, display: DisplayOptions) -> str:
     """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
 
-    These are the windows that are done and the supported new windows or, on request, all new windows.  Nothing is
-    returned if there is no new window.
+    The windows of the next run are those that are done and the supported new windows or, on request, all new windows.
+    Nothing is returned if there is no new window.
     """
     new = plan.all_windows if display.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))

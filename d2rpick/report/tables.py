@@ -349,8 +349,8 @@ def _make_exact_cell(value: Cell) -> Cell:
 def as_json(result: Any, indent: int | None = 2) -> str:
     r"""Write a result as JSON at full precision, with null for unknown values. A NaN is a bug and raises ValueError.
 
-    Without ``indent`` it is one line.  Characters that control a terminal or change the text direction become
-    ``\u....``.
+    If ``indent`` is not given, the result is one line.  Characters that control a terminal or change the text direction
+    become ``\u....``.
     """
     import json
     import unicodedata

@@ -56,7 +56,7 @@ class VibratingTogether(Protocol):
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return times and kinetic energies (n,) of the vibration in the flight, without the fall; None if unknown."""
+        """Return times and energies (n,) of the kinetic vibration energy in the flight; None if unknown."""
 
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Find the spectral lines of an energy: its decaying exponentials, without an initial guess.
+"""Find the spectral lines of an energy: its decaying exponentials, for which no initial guess is needed.
 
 The internal energy of a linear structure in free flight has one line for each mode, at twice the rate and twice the
 decay of the mode, above a mean that falls slowly.  The rates come from the shift invariance of the signal space

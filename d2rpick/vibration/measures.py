@@ -168,8 +168,8 @@ def band_about(
 ) -> tuple[Samples, Samples, Samples]:
     """Return a residual with its lower and upper bound, from its square and the error of the square.
 
-    It may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No square is
-    below zero: where it may reach there, the middle of what remains is stated.
+    The square may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No
+    square is below zero: where it may reach there, the middle of what remains is stated.
     """
     low = np.maximum(squared - off, 0.0)
     high = squared + off
@@ -236,8 +236,8 @@ def run_time_share(
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     """Return by how much each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
 
-    That is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr by the
-    tolerated growth; one period if q stays inside, since q has then passed all its values.
+    The limit is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr
+    by the tolerated growth; one period if q stays inside, since q has then passed all its values.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
     room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(

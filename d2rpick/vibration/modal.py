@@ -505,7 +505,7 @@ def identify_modal(
     Returns
     -------
     ModalVibration or None
-        Its ``doubts`` show whether it is reliable.
+        The ``doubts`` of the vibration show whether it is reliable.
 
     Examples
     --------

@@ -59,8 +59,8 @@ _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 class Compared(NamedTuple):
     """Deformations that can be compared with those at td, from ``first`` to ``last`` [time].
 
-    ``profile`` returns their frozen-deformation error before a td; it is None for one mode, which has a closed form.
-    ``band`` is that of a residual.
+    ``profile`` returns their frozen-deformation error before a td; it is None if there is only one mode, which has a
+    closed form. ``band`` is that of a residual.
     """
 
     deformation: Deformation
@@ -228,7 +228,7 @@ class Vibration:
         """Return the uncertainty of each moment [time]; for a match, a share of an interval of the profile.
 
         A match lies at a minimum of the error: in the same interval if only states are known, and much nearer to the
-        vertex of a parabola if the course between them is known.
+        vertex of a parabola if the error between them is known.
         """
         reach = self.whole.reach(moments.tr)
         if self.profile is None:
@@ -294,7 +294,7 @@ def measure_all(
 ) -> tuple[Samples, Columns]:
     """Return the energy of each tr (n,), and its measures if its deformation is comparable with that at its td.
 
-    Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
+    The times of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
     energy = np.empty(tr.shape)
     columns = []

@@ -102,7 +102,7 @@ class Mode(SignedAmplitudes):
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Return the kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].
 
-        This follows from T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
+        The formula follows from T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
         """
         return (self.velocity(t) / self.omega_0) ** 2
 

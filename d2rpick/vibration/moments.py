@@ -379,7 +379,7 @@ def compute_fitted_reach(
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
     record about it, and the systematic part of the misfit.  Arguments and result are those of
-    ``compute_sampled_reach``, without level.
+    ``compute_sampled_reach``, except the level.
     """
     all_times = np.append(times, td)
     deviation = _DEVIATIONS * fit.energy_deviation(
@@ -438,7 +438,7 @@ def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
 def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     """Return the largest |E''| near ``at``, from four second divided differences around it [energy/time^2].
 
-    It is zero if the record has fewer than three samples.
+    The result is zero if the record has fewer than three samples.
     """
     at = np.asarray(at, dtype=np.float64)
     if time.size < 3:

@@ -263,8 +263,8 @@ def compute_lacking_energy(
 def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
     """Return an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
 
-    An energy history contains neither masses nor the motion of the whole; they are chosen so that the deformation
-    equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
+    An energy history contains neither masses nor the motion of the centre of mass; they are chosen so that the
+    deformation equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
     """
     mass = 4 / mode.omega_0**2
     q = mode.deformation(time) - mode.preload

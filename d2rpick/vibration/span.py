@@ -274,7 +274,7 @@ def find_span(
 ) -> Span | None:
     """Find the window around ``anchor`` [time], within ``bounds``, in which the record follows ``fit``.
 
-    It ends where the energy deviates from the fit; None if it deviates at the anchor itself.
+    The window ends where the energy deviates from the fit; None if it deviates at the anchor itself.
     """
     assert fit.mode is not None
     return _find_span_of_mode(history, anchor, bounds, fit.mode, fit.rms, fit.structure)
@@ -475,7 +475,8 @@ def _clear_ends(
 def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     """Return the share of the vibration energy that a further mode, hidden in the misfit, may have [-].
 
-    That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
+    This share is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most
+    1.
 
     Parameters
     ----------

@@ -167,7 +167,7 @@ def compare_error_with_contact(
 def find_energy_of_next_contact(history: History, flight: Flight) -> float | None:
     """Return the energy that the next contact puts into the parts [energy]; None if no contact is seen.
 
-    It is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy of
+    This energy is the rise of the internal energy after the flight that the record shows, or else the kinetic energy of
     the approach at the end of the flight.
     """
     end = flight.end

@@ -41,7 +41,7 @@ _SAME_SWING = "on the same swing of the energy as td, which saves hardly anythin
 
 
 class Candidate(Measured, Record):
-    """One tr for the td of a situation; the fields are the keys of the JSON output, None for unknown values.
+    """One tr for the td of a situation; the fields are the keys of the JSON output; unknown values are None.
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several modes,
@@ -253,7 +253,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Return the candidates in the given ``rows``, without the objections."""
+        """Return the candidates in the given ``rows``; their objections are left out."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
@@ -462,7 +462,7 @@ def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
 
 
 def _select_distinct(situation: Situation, moments: Moments) -> Moments:
-    """Return the moments in time order, without matches next to a crossing or an extremum."""
+    """Return the moments in time order; matches next to a crossing or an extremum are left out."""
     matches = moments.are("match")
     if matches.any():
         is_distinct = ~matches

@@ -178,8 +178,8 @@ def decide(
 ) -> Decision:
     """Decide on a tr in a situation. Any ``objections`` make it inadmissible; ``better`` is a better pair.
 
-    Without a better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which
-    the pair is the best [time], if all were compared.
+    If there is no better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of
+    which the pair is the best [time], if all were compared.
     """
     quality = grade_pair(situation, candidate)
     return Decision(

@@ -131,7 +131,7 @@ def is_within_band(
     All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
     A pair is expected to be no worse than the error of the best one, and its own error is no worse than the upper bound
-    of that.  It is also on the same side of the limits of a grade, and of a release without any vibration.
+    of that.  It is also on the same side of the limits of a grade, and of the residual of no vibration.
     """
     limit = np.maximum(error_of_best, best)
     # Numpy warnings are not needed, because the bound is unknown if all errors are infinite.

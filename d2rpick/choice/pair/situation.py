@@ -85,8 +85,8 @@ def is_at_rest(
 def _find_faint_fluctuation(history: History, start: float) -> float:
     """Return the fluctuation of the energy up to which the flight is treated as free of vibration [energy].
 
-    It is the largest of the solver error, the printed digits, and a small share of the energy that falls after the
-    ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
+    This limit is the largest of the solver error, the printed digits, and a small share of the energy that falls after
+    the ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
     """
     energies = history.between(start, history.end)[1]
     fall = float((np.maximum.accumulate(energies) - energies).max(initial=0.0))

@@ -460,7 +460,7 @@ def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 def compute_shortfall(energy: Samples, mean: float) -> Samples:
     """Return by how much a locked-in amplitude falls short of the largest amplitude, 1 - sqrt(E/(2 <E>)) [-].
 
-    It is infinite for larger energies, which must not be locked in.
+    The shortfall is infinite for larger energies, which must not be locked in.
 
     Examples
     --------

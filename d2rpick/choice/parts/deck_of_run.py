@@ -304,7 +304,7 @@ def _group_connected_parts(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
 
 
 def _make_supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
-    """Return the supports with their names and times, without duplicates."""
+    """Return the supports with their names and times; each support occurs once."""
     return tuple(
         dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
     )

@@ -99,7 +99,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     Returns
     -------
     RunFacts
-        Without parts, and with the reason, if the files have no data of parts.
+        If the files have no data of parts, the result has no parts but the reason.
     """
     try:
         energies = run.part_energies(run.parts)

@@ -142,7 +142,7 @@ class Common(NamedTuple):
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
-    level errors on the energy alone [-]; None for a run that was not judged.
+    level errors on the energy alone [-]; None if the run was not judged.
     """
 
     tr: float | None

@@ -132,7 +132,7 @@ def prepare_switched_history(
     Returns
     -------
     history : History
-        Without part momenta if rigid bodies had replaced the parts.
+        The part momenta are left out if rigid bodies had replaced the parts.
     windows : tuple of (float, float)
         Windows that are done: ``done``, and others in which all requested parts were rigid [time].
     cautions : tuple of Caution

@@ -32,8 +32,8 @@ def find_longest_flight(
 ) -> tuple[float, float]:
     """Return the longest flight as a window for td within the record [time].
 
-    If only the energy shows the flight, its end may differ from td to td; then the window keeps the margin.  Without a
-    flight, ``otherwise`` is returned.
+    If only the energy shows the flight, its end may differ from td to td; then the window keeps the margin.  If there
+    is no flight, ``otherwise`` is returned.
 
     Raises
     ------

@@ -106,7 +106,7 @@ class PlannedFlight(NamedTuple):
     def locks_in(self) -> bool | None:
         """True if the window locks in energy, so that later landings move; None if there is no window.
 
-        It locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
+        The window locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
         """
         if self.answer is None or self.window is None:
             return None
@@ -187,7 +187,7 @@ def plan_run(
     Parameters
     ----------
     reference : Reference
-        The run: without switching, or switched in the windows that are ``done``.
+        The run, which must not be switched, except in the windows that are ``done``.
     settings : Settings
         As for ``suggest``.  ``after`` applies to the flight that contains it; earlier flights are left out.
     min_rigid : float, optional

@@ -144,7 +144,7 @@ def choose_td(
     certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
     smallest is of like quality.  On the energy alone, a level within the tolerance of the best one is, and the best one
     is twice the mean energy.  The chosen td keeps the margin before the contact, unless the whole window lies in the
-    margin.  Without an acceptable peak the ends of the window are tried.  A td of ``times`` (default: an even grid)
+    margin.  If no peak is acceptable, the ends of the window are tried.  A td of ``times`` (default: an even grid)
     replaces the chosen one if its pair is better in both error and rigid time.  If nothing vibrates, all td are equally
     good and the last one is chosen, since it saves most.
 
@@ -347,7 +347,7 @@ def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
 def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Return the last td in a window in which nothing vibrates.
 
-    It lies before the last state, and before the contact by the time that the contact may move.
+    This td lies before the last state, and before the contact by the time that the contact may move.
     """
     history = situation.history
     flight = situation.flight

@@ -80,8 +80,8 @@ class Offer(AnswerAtTd):
     def error(self) -> float | None:
         """Error by which offers are compared [-].
 
-        It is the residual; on basis "energy" the shortfall of the level at td from the largest vibration energy, 1 -
-        sqrt(E(td)/(2 <E>)).
+        This error is the residual; on basis "energy" the shortfall of the level at td from the largest vibration
+        energy, 1 - sqrt(E(td)/(2 <E>)).
         """
         return get_error_of_pair(self.situation, self.pair)
 

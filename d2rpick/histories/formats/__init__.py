@@ -22,8 +22,8 @@ class Listed(NamedTuple):
 
     The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
     names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
-    name. Only files of a solver have an energy balance and one common time. A format without a solver holds columns
-    named by a user.
+    name. Only files of a solver have an energy balance and one common time. A format that belongs to no solver holds
+    columns named by a user.
     """
 
     module: str

@@ -281,7 +281,7 @@ def _decode_state_numbers(
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
     """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
 
-    Both are NaN if the conversion would be inexact.
+    Factor and divisor are NaN if the conversion would be inexact.
     """
     exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
     powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[

@@ -52,7 +52,7 @@ class Blocks(Database):
     data : bytes or Content
         The file.
     source : str
-        Its name, for messages.
+        Name of the format, for messages.
     grammar : Grammar
         What a block looks like.
     ahead : sequence of names, optional
@@ -61,9 +61,9 @@ class Blocks(Database):
     Attributes
     ----------
     states : int
-        Number of whole states.
+        Number of complete states.
     tail : int
-        Address of the last block of the file, whole or not; the address after the head if there is no block.
+        Address of the last block of the file, complete or not; the address after the head if there is no block.
     rest : Stretch or None
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
@@ -186,8 +186,8 @@ class Blocks(Database):
     def find_resume_points(self) -> dict[str, ResumePoint]:
         """Return where a later read can begin: at the newest state with the third-to-last printed time.
 
-        The states after it tell whether the last one is whole, and which of those with the same printed time is the
-        newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not whole.
+        The states after it tell whether the last one is complete, and which of those with the same printed time is the
+        newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not complete.
         """
         first, begin, end = self._find(self._begin), self.tail, len(self._data)
         head = self._data[: self.tail if first is None else first]
@@ -307,7 +307,7 @@ class Blocks(Database):
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
         """Return True if a block is complete: it contains the number with which the previous block ends.
 
-        Without a previous block, the grammar decides.
+        If there is no previous block, the grammar decides.
         """
         if previous is None:
             return self._grammar.whole(layout)

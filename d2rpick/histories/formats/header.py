@@ -61,7 +61,7 @@ def read_header(
     lines : sequence of str
         All lines above the first row.
     separator : str or None
-        Between the cells; None for blanks.
+        Character between the cells; None means blanks.
     columns : int
         How many values each row has.
 

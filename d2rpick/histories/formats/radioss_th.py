@@ -142,7 +142,7 @@ class TimeHistory(Database):
     Raises
     ------
     FormatError
-        If the head is not whole, a record has not the length in the head, or the text is coded.
+        If the head is not complete, a record has not the length in the head, or the text is coded.
     """
 
     format = "radioss-th"

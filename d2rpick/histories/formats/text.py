@@ -240,8 +240,8 @@ def find_precisions(
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
     """Return True if the fields above it show that the last field of a truncated file is complete.
 
-    It is complete if the column has a format of constant length: always the same number of decimals (two or more) and
-    of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
+    The field is complete if the column has a format of constant length: always the same number of decimals (two or
+    more) and of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
     exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt. It is also complete if
     it has the 17 digits that restore every double, no field above has more, and no exponent can follow: an exponent
     follows only a mantissa with one digit before the point.
