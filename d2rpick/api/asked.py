@@ -142,7 +142,7 @@ def ask_run(
     D2RPickError
         If the run has no such parts or energy, or the deck or the weights cannot be read.
     ArgumentError
-        If the recommended set is requested together with other parts, or without a deck.
+        If the recommended set is requested together with other parts, or if there is no deck.
     """
     settings = request.settings
     model = read_cost_model(request)
@@ -233,7 +233,7 @@ def complete_selection(
 
 
 def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
-    """Refuse the recommended set together with other parts, or without a deck."""
+    """Refuse the recommended set together with other parts, or if there is no deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(

@@ -270,7 +270,7 @@ def name_needed_argument(solver: Module) -> str:
 
 
 def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
-    """Return the ids given as numbers and ranges. Without a history, all ids of a range are assumed to exist."""
+    """Return the ids given as numbers and ranges. If there is no history, all ids of a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -302,7 +302,8 @@ class JudgedCard(NamedTuple):
     """A card, and the verdict on each of its new windows with the times as printed; ``str`` returns its text.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
-    ``cautions`` are the findings of `check` with the card in the deck of the run, and without a deck what is unknown.
+    ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
+    is unknown.
     """
 
     card: PrintedCard
@@ -404,7 +405,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; with a run they are judged by it.
+    """Print solver input for switching windows, as ``d2rpick card`` does; if a run is given, judge the windows by it.
 
     Parameters
     ----------
@@ -475,7 +476,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the card to print without a history; raise ArgumentError if an option is missing."""
+    """Return the card to print if there is no history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

@@ -208,7 +208,7 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result of each deck once, and of a run under its first file. A folder stands for its main decks."""
+    """Yield the result of each deck and each run once; a folder stands for its main decks."""
     visited: set[str] = set()
     # The result is cached, because it asks the system for each parent folder.
     real_folder = cache(os.path.realpath)
@@ -249,7 +249,7 @@ def _check_each(
 
 
 def _list_decks(name: str) -> list[str] | DeckError:
-    """Return the main decks in a folder, or the deck itself; return an error for a folder without decks."""
+    """Return the main decks in a folder, or the deck itself; return an error if a folder contains no decks."""
     try:
         return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path.is_dir fails on some names
     except DeckError as error:

@@ -34,7 +34,8 @@ class PartTable(Paged, sets_of_parts.Parts):
     """Answer from `parts`; it is immutable.
 
     ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` the sets that are compared, ``recommended``
-    the set to use, None without one; its ``parts`` and ``cost_share`` are arguments of `suggest` and `plan`.
+    the set to use, None if no set is recommended; its ``parts`` and ``cost_share`` are arguments of `suggest` and
+    `plan`.
     """
 
     run: Run

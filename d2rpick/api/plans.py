@@ -229,7 +229,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
-        """Return the card for the next run; None without named parts, or if the deck's bodies cannot be switched."""
+        """Return the card for the next run; None if no parts are named, or if the deck's bodies cannot be switched."""
         from d2rpick.choice.judged_card import complete_printing, list_switched
 
         try:

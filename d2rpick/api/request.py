@@ -164,7 +164,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def folder(self) -> str | None:
-        """The folder of the run, in which its main deck is searched for; None if a deck is named or excluded."""
+        """The folder of the run, which should contain its main deck; None if a deck is named or excluded."""
         import os
 
         if self.deck is not None or self.no_deck:

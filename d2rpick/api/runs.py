@@ -124,13 +124,13 @@ class Run:
         ----------
         parts : number, title or several, optional
             Whose internal energies: as ``suggest`` takes them, or ``"all"``.  Default: the energy that ``suggest``
-            takes without parts.
+            takes if it has no parts.
 
         Returns
         -------
         pandas.DataFrame
-            Index ``time``, shape (states, parts) with the part's title as the name of its column (``part 3`` without a
-            title, ``door (7)`` where several have it), or (states, 1) with ``internal_energy`` [energy].  ``attrs``:
+            Index ``time``, shape (states, parts) with the part's title as the name of its column (``part 3`` if it has
+            no title, ``door (7)`` where several have it), or (states, 1) with ``internal_energy`` [energy].  ``attrs``:
             ``source``, ``format``, ``channel``, ``time_unit`` (empty where no file names it), ``titles`` of the parts
             by number, ``ids`` by the name of the column, and ``notes``.
 

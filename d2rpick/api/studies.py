@@ -50,8 +50,8 @@ _LAST: Final = b'{"schema": '  # beginning of the summary line below the rows
 class Study(Paged, core.StudyOfRuns):
     """Answer from `study`; it is immutable.
 
-    ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None without a tr.  ``common`` is
-    one tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the
+    ``runs`` has a row per run.  ``agree`` is True if the intervals of tr intersect, None if there is no tr.  ``common``
+    is one tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the
     reason.  Times are in the unit of the runs; ``td`` is None if each run has its own.
     """
 
@@ -93,7 +93,7 @@ def study(
     td : float or text, optional
         When the parts are switched back [time]; a string such as ``"64ms"`` if all runs name the same unit.
     td_window : (float, float), optional
-        Instead of ``td``: the range in which each run chooses its own td [time]; without both, its longest flight.
+        Instead of ``td``: the range in which each run chooses its own td [time]; by default its longest flight.
     parts, flying, **choosing
         As for `suggest`.
     time, energy, channels, input_format

@@ -71,11 +71,11 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
+        """Print the card of the recommended pair, judged as printed; return None if there is no recommendation."""
         return self.printed(Cards.for_run(self.question.run, options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; return None without a recommendation."""
+        """Print the card of the recommended pair, judged as printed; return None if there is no recommendation."""
         pair = self.recommended
         question = self.question
         judge = partial(
@@ -184,7 +184,7 @@ def suggest(
     td : float or text
         When the parts are switched back [time]; a string with a unit, such as ``"64ms"``, if the run names its own.
     td_window : (float, float)
-        Instead of ``td``: the range in which td is chosen [time]; without both, the longest flight.
+        Instead of ``td``: the range in which td is chosen [time]; by default the longest flight.
     parts : number, title or several, optional
         The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
         ``"all"`` all that have energy.

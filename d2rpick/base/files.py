@@ -221,7 +221,7 @@ def _state_of(name: str) -> FileState:
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
-    """Fill ``room`` with the bytes of a file from an offset on, and return their number, fewer if the file ends."""
+    """Fill ``room`` with the bytes of a file after an offset; return their number, fewer if the file ends."""
     done = 0
     while done < len(room):
         # One call may return fewer bytes than requested, and never more than 2 GB.
@@ -294,7 +294,7 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
 
 
 def _copy_access(replaced: Path, scratch: Path) -> None:
-    """Copy owner, group and mode of the file that will be replaced; without one, use the mode of any new file."""
+    """Copy owner, group and mode of the file that will be replaced; if there is none, use the mode of any new file."""
     try:
         status = replaced.stat()
     except FileNotFoundError:

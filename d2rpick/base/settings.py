@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _OF_REPOSITORIES: Final = (".git", ".hg")  # folders that mark the root of a repository
-# Settings of the deck check. They are searched for in the folder of each deck and the folders above.
+# Settings of the deck check; the search covers the folder of each deck and the folders above it.
 RULE_KEYS: Final = ("select", "ignore", "severity")
 # Quotes and blanks that may surround the parts of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))

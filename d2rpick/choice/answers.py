@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# The search for a better pair ends after this many pairs at other energy peaks were refused.
+# The search for a better pair ends after this number of pairs at other energy peaks was found inadmissible.
 _MOST_REFUSED = 3
 
 
@@ -115,7 +115,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair that is not poor, with another tr for this td or at the nearest better td; None without one."""
+        """A better pair that is not poor, for this td or at the nearest better td; None if there is none."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
@@ -241,7 +241,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def chosen(self) -> Candidate | None:
-        """The recommended candidate; None without one."""
+        """The recommended candidate; None if no candidate is recommended."""
         return self.candidates.chosen
 
     @property
@@ -255,7 +255,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def recommended(self) -> Pair | None:
-        """The recommended pair; None without one."""
+        """The recommended pair; None if no pair is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -332,7 +332,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the recommended pair; None without one."""
+        """Grade of the recommended pair; None if no pair is recommended."""
         return self.decision.quality if self.decision else None
 
     @cached_property
@@ -528,7 +528,7 @@ def suggest_in_run(
 ) -> PairSuggestion:
     """Choose tr for ``td``, or both times if ``td`` is a window (low, high) or None (the longest flight) [time].
 
-    If ``with_better`` is False, no better td than a given td is searched for.  If td is chosen, no flight is assumed to
+    If ``with_better`` is False, no better td than a given td is determined.  If td is chosen, no flight is assumed to
     begin before ``since``, and ``times`` are tried in addition to the energy peaks, by default an even grid [time].
 
     Raises

@@ -79,7 +79,7 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
 def print_pair(
     reference: Reference, situation: Situation, tr: float, printing: Printing
 ) -> PrintedCard | None:
-    """Print the card for ``tr`` and the td of a situation, and judge its times; None without parts to switch."""
+    """Print the card for ``tr`` and the td of a situation, and judge its times; None if no parts are to be switched."""
     history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation

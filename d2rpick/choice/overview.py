@@ -80,13 +80,13 @@ class Overview(NamedTuple):
     """Contents of the files of a run.
 
     Times are in the unit of the run, which ``time_unit`` gives only if a file names it.  ``sampling`` is None for a
-    single state.  It and the times are None without states; they and ``states`` are None if the time has to be chosen
-    among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its source:
-    ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.  ``health``
-    is that of the run, with the longest flight as its window; None without energies.  ``unjudged`` states why no times
-    can be chosen from the run; empty if they can.  ``should_write`` names the output that would show the flights for
-    certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run that was used,
-    and ``selection`` the columns and parts that the user chose.
+    single state.  It and the times are None if there are no states; they and ``states`` are None if the time has to be
+    chosen among several columns.  ``flights`` are the free flights of the requested parts, or of all, each with its
+    source: ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.
+    ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
+    states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
+    show the flights for certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run
+    that was used, and ``selection`` the columns and parts that the user chose.
     """
 
     source: tuple[str, ...]
@@ -272,7 +272,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
-    """Return the run with the surroundings from a deck, and warnings; raise DeckError if the deck cannot be read."""
+    """Add the supports, gravity and joints of a deck to the run; also return warnings. Raise DeckError on failure."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
@@ -337,7 +337,7 @@ def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
 
 
 def _find_maximum(energies: Samples) -> float | None:
-    """Return the largest energy; None without energies."""
+    """Return the largest energy; None if there are no energies."""
     return float(energies.max()) if energies.size else None
 
 
@@ -355,7 +355,7 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside of rigid windows; None without energies."""
+    """Return the health of the run outside of rigid windows; None if there are no energies."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )

@@ -67,10 +67,10 @@ class Settings(ChoiceOptions):
 
     ``oscillator``: given instead of identified.  ``replay`` False: judge by the energy level alone.  ``min_quality``:
     lowest grade of a pair that is planned, and that a deck passes with.  ``bodies``: rigid bodies that the parts
-    become, according to a deck; None without a deck, empty if it does not define them; then one body is assumed.
+    become, according to a deck; None if there is no deck, empty if it does not define them; then one body is assumed.
     ``placement``: places of the parts according to the deck, or None.  ``by_deck``: sources of these and of a cost
-    share that is not given; None without a deck.  ``kept_off``: main nodes of rigid bodies that a Radioss deck keeps
-    inactive.  ``ruined``: faults of the deck that ruin its run.
+    share that is not given; None if there is no deck.  ``kept_off``: main nodes of rigid bodies that a Radioss deck
+    keeps inactive.  ``ruined``: faults of the deck that ruin its run.
     """
 
     min_quality: str = FAIR

@@ -275,7 +275,7 @@ class Output:
         click.echo(bold, nl=False, color=colour)
 
     def content(self, content: bytes) -> None:
-        """Write a result that is the content of a file."""
+        """Write the bytes of a result, such as a figure, to the result file or to stdout."""
         if self.file is not None:
             self.write(self.file, content)
         else:
@@ -466,7 +466,7 @@ def open_with_output(
     """
     from d2rpick.api.asked import open_requested_run
 
-    request.selection()  # The call refuses contradictory options before a file is opened.
+    request.selection()  # This call raises an error for contradictory options before a file is opened.
     with show_reading(request.history, quiet=output.quiet):
         run = open_requested_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

@@ -53,13 +53,13 @@ def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
 
 
 class Count:
-    """The number of finished runs out of ``total``; ``taken`` of them came from an earlier study."""
+    """The number of finished runs out of ``total``; ``taken`` of these results come from an earlier study."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Set the number of finished runs; the first call sets the number of runs from an earlier study."""
+        """Set the number of finished runs; the first call gives the number of results taken from an earlier study."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:

@@ -40,7 +40,7 @@ class ForceTiming(NamedTuple):
     """Times of a force switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
-    Tdelay. ``offset`` is a distance, 0 for none.
+    Tdelay. ``offset`` is a distance, 0 if the card has no offset.
     """
 
     earliest: float
@@ -146,12 +146,12 @@ def _find_least_wait(
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Return the first span that begins at or after a time; without one, return infinite times."""
+    """Return the first span that begins at or after a time; if there is none, return infinite times."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Return the last span that ends at or before a time; without one, return times of minus infinity."""
+    """Return the last span that ends at or before a time; if there is none, return times of minus infinity."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

@@ -23,7 +23,7 @@ _NUMBER = re.compile(
 _TOKEN: Final = (  # This pattern is compiled at its first use, to keep start-up fast.
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
-REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # This pattern is compiled at its first use, to keep start-up fast.
+REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # Reference to a parameter, such as &tend.
 # Largest depth of nested parentheses, so that the recursion cannot exhaust Python's stack.
 _DEEPEST = 50
 LONGEST = 40  # largest number of characters of a number in a deck
@@ -207,7 +207,7 @@ _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = 
 
 
 class _Parser:
-    """Parser by precedence climbing: it reads a value, then all operators of at least a given precedence."""
+    """Parser of arithmetic expressions that respects the precedence of the operators."""
 
     def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
         self.text = text

@@ -97,7 +97,7 @@ def _follow_switches(
 
 
 def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
-    """Return the first time from ``since`` on with a force, or without a force; infinity if there is no such time."""
+    """Return the first time at or after ``since`` at which a force acts, or does not act; infinity if there is none."""
     for start, end in contacts:
         if since < end:
             if with_force:

@@ -291,7 +291,7 @@ class Placement:
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
         """Return the mean position (3,) of the watched nodes of given parts [length]; each node is used once.
 
-        None without any.
+        The result is None if no node is watched.
         """
         coordinates = {
             node: position

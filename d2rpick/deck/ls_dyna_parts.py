@@ -422,7 +422,7 @@ Kind = Literal[
 
 
 class Constraint(NamedTuple):
-    """A constraint: its kind, field, id (0 for none), nodes, and the rigid part to which it belongs."""
+    """A constraint: its kind, field, id (0 if it has no id), nodes, and the rigid part to which it belongs."""
 
     kind: Kind
     place: CardField

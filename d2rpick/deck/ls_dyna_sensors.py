@@ -53,7 +53,7 @@ class Control(NamedTuple):
 
 
 class Change(NamedTuple):
-    """The state of a control, on or off, from ``time`` on [time of the deck]."""
+    """The state of a control, on or off, that begins at ``time`` [time of the deck]."""
 
     time: float
     on: bool
@@ -93,7 +93,7 @@ def follow_control(
     control : Control
         The control to follow.
     forces : callable or None
-        Returns the spans in which the force of a contact or wall is above a value; None without a history.
+        Returns the spans in which the force of a contact or wall is above a value; None if there is no history.
     end : float
         End of the run [time].
 
@@ -127,7 +127,7 @@ def follow_control(
 
 
 def _find_first_time(spans: Spans, since: float) -> float:
-    """Return the first time from ``since`` on at which a condition is met; infinity if there is no such time."""
+    """Return the first time at or after ``since`` at which a condition is met; infinity if there is none."""
     return next((max(since, start) for start, end in spans if since < end), math.inf)
 
 

@@ -152,7 +152,7 @@ def read_lines(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
 
 
 def _read_pieces(block: Block) -> Iterator[bytes]:
-    """Yield the bytes below the keyword line in pieces of whole lines."""
+    """Yield the bytes below the keyword line in pieces that end with a line end."""
     pieces = block.source.pieces(block.start, block.end)
     yield next(pieces).partition(b"\n")[2]
     yield from pieces

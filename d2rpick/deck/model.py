@@ -99,7 +99,7 @@ class Boundary(NamedTuple):
     def of(
         cls, holds: Sequence[Hold | str], loads: Sequence[Gravity | str], *, whole: bool
     ) -> Boundary:
-        """Separate supports and gravity from notes (strings); unless the deck is ``whole``, gravity is unknown."""
+        """Separate supports and gravity from notes (strings); gravity is unknown if the deck is not ``whole``."""
         gravity = tuple(load for load in loads if isinstance(load, Gravity))
         is_known = whole and len(gravity) == len(loads)
         notes = tuple(note for note in (*holds, *loads) if isinstance(note, str))

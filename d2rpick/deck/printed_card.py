@@ -40,7 +40,7 @@ class Printing(NamedTuple):
     Attributes
     ----------
     solver : str, optional
-        A key of `SOLVERS`; without it the card is for the solver that wrote the history, or else for LS-DYNA.
+        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, or else for LS-DYNA.
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int
@@ -48,9 +48,9 @@ class Printing(NamedTuple):
     off : tuple of int
         Main nodes of further rigid bodies, which stay off in all legs.
     merge : int, optional
-        Lead part into which all others are merged; without it each part becomes a rigid body of its own.
+        Lead part into which all others are merged; if it is missing, each part becomes a separate rigid body.
     bodies : tuple of tuple of int, optional
-        Parts of each rigid body; without ``merge`` they are merged into the first part of their body.
+        Parts of each rigid body; if ``merge`` is missing, they are merged into the first part of their body.
     swset : pair of int
         Ids of the two switch sets of the first window; further windows use the ids above the larger one.
     step_cap : float, optional
@@ -100,7 +100,7 @@ class Printing(NamedTuple):
 class PrintedCard:
     """Solver input: the whole ``text``, and ``files`` with the same text under the file names that the solver expects.
 
-    ``windows`` are the times as printed, ``notes`` report times that differ from the given ones. ``starter`` are cards
+    ``windows`` are the times as printed, ``notes`` report times that differ from the given times. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
     ``fewest_cycles`` are those of a run whose largest time step holds throughout, as with sensors; else None.
     """

@@ -252,7 +252,7 @@ def _print_radioss(
 ) -> PrintedCard:
     """Print engine files: one engine run up to each switch, and one to the end of the run.
 
-    The main nodes are those of /RBODY in the starter deck, for bodies without sensor. Without a given limit, the time
+    The main nodes are those of /RBODY in the starter deck, for bodies without sensor. If no limit is given, the time
     step is at most 1/1000 of the rigid window while the bodies are rigid.
 
     Raises
@@ -404,7 +404,7 @@ def _print_sensors(
 def _write_sensors(
     spans: Sequence[Times], first: int, force: tuple[str, int, float] | None = None
 ) -> tuple[str, int]:
-    """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines all of them.
+    """Return the text of sensors, whose ids begin with ``first``, and the id of the sensor that combines all of them.
 
     It is active in each of ``spans``, and while a ``force`` acts, given by the arguments of `write_force_sensor`.
     """

@@ -133,7 +133,7 @@ def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
 
 
 def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
-    """Return the bodies that are off in the whole run and whose nodes belong to new bodies in ``cards``.
+    """Return the bodies that are inactive throughout the run and share nodes with new bodies in ``cards``.
 
     A node belongs to one body, so these bodies have to be removed from the starter deck.
     """
@@ -294,7 +294,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return main node and cards of a new body of given parts, with velocity and gravity for the main node."""
+        """Return the main node of a new rigid body of given parts, and the body's cards with velocity and gravity."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")
@@ -379,7 +379,7 @@ class _BodyWriter:
     def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
         """Return the nodes of the group in a column of a card, or the nodes that the card lists.
 
-        Empty for a card without group.
+        Empty if a card has no group.
         """
         rows = card.rows[1:]
         if column is None:

@@ -136,7 +136,7 @@ def get_lines_below_title(card: Card) -> tuple[Row, ...]:
 
 
 class InitialVelocity(NamedTuple):
-    """An /INIV card: velocities at the start of an engine run for ranges of nodes, or for a group (0 for none)."""
+    """An /INIV card: initial velocities of an engine run for ranges of nodes or a group (0 if there is no group)."""
 
     card: Card
     ranges: tuple[tuple[int, int], ...]
@@ -327,7 +327,7 @@ class Starter:
                 )
 
     def _bodies_of_parts(self) -> Iterator[Body]:
-        """Yield the bodies that the starter makes of parts with Irigid 1."""
+        """Yield the rigid bodies that the starter creates for parts with Irigid = 1."""
         for card in self.named("PART") if self.version >= _RIGID_PARTS_SINCE else ():
             if len(card.rows) < 3:
                 continue

@@ -142,7 +142,7 @@ class _Property(NamedTuple):
 
 
 def read_radioss_inventory(run: RadiossRun) -> Inventory:
-    """Return the parts and elements of a run; without a starter deck, return none and a note."""
+    """Return the parts and elements of a run; if there is no starter deck, return a note only."""
     starter = run.starter
     if starter is None:
         return Inventory(

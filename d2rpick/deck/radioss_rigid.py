@@ -27,7 +27,7 @@ MADE_HERE: Final = 10**10
 
 
 class Body(NamedTuple):
-    """A rigid body: its id, main node, sensor and node group (0 for none).
+    """A rigid body: its id, main node, sensor and node group; an id is 0 if there is no such object.
 
     ``stays``: the starter keeps its nodes in rigid walls (Ikrem 1, or a sensor). ``part`` is the part from which the
     starter makes the body (Irigid); such a body has no id in the deck.

@@ -425,7 +425,7 @@ def find_time_units(run: RadiossRun) -> tuple[str, str]:
 
 
 def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
-    """Return the parts of the bodies that the first engine run deactivates, ascending; empty without a starter deck."""
+    """Return the parts of the bodies that the first engine run deactivates; empty if there is no starter deck."""
     nodes = find_bodies_kept_off(run.legs[:1])
     bodies = run.starter.bodies if run.starter else ()
     groups = {

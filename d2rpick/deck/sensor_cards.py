@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def write_time_sensor(
     number: int, title: str, start: float, stop: float | None = None
 ) -> str:
-    """Return a sensor that is active from ``start`` on, or until ``stop`` if it is given [time]."""
+    """Return a sensor that becomes active at ``start`` and inactive at ``stop`` if ``stop`` is given [time]."""
     text = f"/SENSOR/TIME/{number}\n{title}\n{DELAY.write(Tdelay=write_number(start, 20))}\n"
     if stop is None:
         return text
@@ -37,7 +37,7 @@ def write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) ->
 
 
 def write_any_of(numbers: Sequence[int], title: str) -> tuple[str, int]:
-    """Return sensors that are active while any given sensor is; also return the id of the last new sensor."""
+    """Return cards of sensors that combine given sensors by OR, and the id of the last one, which has the result."""
     texts: list[str] = []
     last, *others = numbers
     for number, other in enumerate(others, start=numbers[-1] + 1):

@@ -54,7 +54,7 @@ def choose_flight(
     after: float | None,
     landing: float | None,
 ) -> Flight:
-    """Choose the flight around ``td`` from what was found, or as the user gives it; supported parts never fly.
+    """Choose the flight around ``td`` from the evidence and the user's times; supported parts never fly.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def start_flight_at(
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
-    )  # The oscillator is fitted from `after` on, so its start does not show when the load ends.
+    )  # The oscillator is fitted only after `after`, so its start does not show when the load ends.
     if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):

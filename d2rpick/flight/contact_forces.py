@@ -28,7 +28,7 @@ _INNER: Final = 0.2
 # _PIECES: number of pieces of a flight whose mean energies are compared.
 # _RISE: a mean energy that rises by this share of the highest energy shows a crash.
 # In computed flights with many beating modes, the mean energy rises by up to 0.06 of the highest energy.
-# In a crash, the mean energy rises by nearly the highest energy.
+# In a crash, the mean energy rises from nearly zero to nearly the highest energy.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
@@ -140,7 +140,7 @@ def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
-    """Return True if the internal energy rises in a flight without contact forces, so that some load acts.
+    """Return True if the internal energy rises during the flight, which shows a load that the files do not contain.
 
     In a flight the energy vibrates about its level or falls by damping.
     """

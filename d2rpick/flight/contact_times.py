@@ -3,7 +3,7 @@
 In flight the momentum changes between two states by gravity alone.  The longest flight shows this change.  If the
 momentum changes by more than that, and by more than numerical errors, a force acts.  A force that starts and ends
 within one interval counts as one force.
-If the force of a contact is written, it is used without momenta.
+If the force of a contact is written, momenta are not needed.
 
 A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate,
 with an error of at most half an interval.
@@ -37,7 +37,7 @@ _OF_ONE_INTERVAL: Final = 1 / 3
 class ContactTimes(NamedTuple):
     """Periods in which a force acts: ``spans`` (from, to) [time], each end is accurate to half of ``interval``.
 
-    ``speed`` is the speed of the parts at the end of the longest flight [length/time], None without masses.
+    ``speed`` is the speed of the parts at the end of the longest flight [length/time], None if there are no masses.
     """
 
     spans: tuple[tuple[float, float], ...]

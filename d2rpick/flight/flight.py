@@ -59,10 +59,10 @@ class Flight(NamedTuple):
 
     If nothing flies at td, it is the last flight before td, or else the first one after it, and ``refusal`` gives the
     reason.  ``source`` is the evidence for the start, one of `SOURCES`.  ``parts`` are the parts seen to fly together,
-    None for the whole model.  ``damping`` is the alpha of their momentum [1/time], ``gravity`` the acceleration assumed
-    to be gravity [length/time^2], see `FreeFlight`.  ``doubts`` list contradictions between sources.  For a flight from
-    the energy alone, ``settled`` is the time when the energy had settled; the time from there to ``start`` is left
-    unused for safety.  ``described`` is True if one oscillator describes the energy in the flight.
+    None means the whole model.  ``damping`` is the alpha of their momentum [1/time], ``gravity`` the acceleration
+    assumed to be gravity [length/time^2], see `FreeFlight`.  ``doubts`` list contradictions between sources.  For a
+    flight from the energy alone, ``settled`` is the time when the energy had settled; the time from there to ``start``
+    is left unused for safety.  ``described`` is True if one oscillator describes the energy in the flight.
     """
 
     start: float | None = None
@@ -113,10 +113,10 @@ def _return_false(_: float) -> bool:
 
 
 class Witness(NamedTuple):
-    """A source of evidence: it gives the flight ``around`` a time and the list of all ``flights`` in ascending order.
+    """Data that show flights: the flight ``around`` a time, and all ``flights`` in ascending order.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
-    ``is_contradicted`` tells of a time without a flight whether only the internal energy speaks against one.
+    ``is_contradicted`` returns True for a time if only the internal energy speaks against a flight at that time.
     """
 
     source: str
@@ -136,7 +136,7 @@ class Witness(NamedTuple):
         decisive: bool,
         is_contradicted: Callable[[float], bool] = _return_false,
     ) -> Witness:
-        """Make a source of evidence over ``time`` (n,) that computes each flight and the list of flights once."""
+        """Make a witness over the times ``time`` (n,) that computes each flight and the list of flights only once."""
         once = cache(around)
         return cls(
             source,
@@ -154,7 +154,7 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td. The search begins at the first fixed start time in it, or else at td itself."""
+        """Return the flight around td. The search begins at a fixed start time within the flight, or else at td."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
@@ -175,7 +175,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time, searched for again from its middle, so that it equals the listed flight."""
+    """Return the flight around a time; the search is repeated from its middle, so that it equals the listed flight."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
@@ -216,7 +216,7 @@ def find_seen_flight(history: History, td: float) -> Seen:
 
 
 def _find_flight_by_evidence(history: History, td: float) -> Seen:
-    """Find the flight around ``td`` from the sources of evidence, before supports are considered."""
+    """Find the flight around ``td`` from the witnesses; supports are not considered yet."""
     flights: list[tuple[str, FreeFlight]] = []
     for witness in list_witnesses(history):
         flight = witness.holding(td)
@@ -290,12 +290,12 @@ def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
 
 @remember
 def list_witnesses(history: History) -> tuple[Witness, ...]:
-    """Return the history's sources of evidence, best first."""
+    """Return the witnesses of the flights in a history, the most reliable first."""
     return tuple(_make_witnesses(history))
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Compute the sources of evidence of a history, best first."""
+    """Compute the witnesses of the flights in a history, the most reliable first."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -483,7 +483,7 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return a description of a source of evidence."""
+    """Return the name of the data that show a flight, in words."""
     return str(source).replace("-", " ")
 
 

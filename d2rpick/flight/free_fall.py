@@ -113,9 +113,9 @@ class Laws:
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
-        """Return the acceleration between two states of a flight [length/time^2]: 0 for none, NaN if it is unknown.
+        """Return gravity between two states of a flight [length/time^2]; 0 if there is no gravity, NaN if unknown.
 
-        None if the force there slows the parts down like a brake, or is not gravity.
+        The result is None if the force slows the parts down like a brake, or if the force is not gravity.
         """
         return None if self._braked(first, last) else self._gravity((first, last))
 
@@ -350,7 +350,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Return True if the momentum at right angles to a load shows gravity at some time."""
+        """Return True if at some time the momentum component perpendicular to a load shows gravity."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]

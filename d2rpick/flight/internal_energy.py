@@ -31,7 +31,7 @@ _BAND_RESERVE: Final = 0.25
 _WAIT: Final = 1 / 3
 # _OUTER: the lowest and the highest energies with this share of all energies are outside of the usual range [-].
 # _LATEST: share of the time before td in which the usual rate of the energy is measured [-].
-# _FASTER: a contact changes the energy at least this many times as fast as usual [-].
+# _FASTER: a contact changes the energy at least this many times as fast as the usual rate before td [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # The energy level is the mean energy over this share of the time without load [-].
 # The level has changed once this mean leaves the band of the means before td, widened by its width at both ends.
@@ -47,7 +47,8 @@ _ROUND_OFF: Final = 1e-6
 # The energies in a flight stay in the band of its last quarter, widened by this share of the band's width [-].
 _RESERVE: Final = 0.5
 # The mean energies of the last two quarters of a flight differ by less than this share of the energy band [-].
-# A steady drift changes the mean by the width of the band, a vibration with 3/4 period in each quarter by 30 % of it.
+# A vibration with 3/4 of a period in each quarter changes these means by 30 % of the width of the energy band.
+# A steady drift changes these means by the width of the energy band.
 _DRIFT: Final = 0.35
 # A slow vibration swings at least this many times by at least half of its range; a crash swings fewer times.
 _SWINGS: Final = 4
@@ -58,7 +59,8 @@ _ALIKE: Final = 0.75
 _TO_ZERO, _HARDLY = 0.05, 1e-3
 # _FLAT: a body yields in its first oscillation if its energy comes within this share of its later level [-].
 # _MOST_FLAT: longest time for which the energy stays near its minimum, as a share of the time in which it rises [-].
-# A harmonic motion stays near its minimum for 0.7 of its rise time, and a body that collides later stays for longer.
+# The energy of a harmonic motion stays near its minimum for 0.7 of its rise time.
+# The energy of a body that collides later stays near its minimum for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
 # Yielding is fed by kinetic energy, so the total energy rises by at most this share of the energy of yielding [-].
 _NOT_FROM_MOTION: Final = 0.1
@@ -67,8 +69,8 @@ _NOT_FROM_MOTION: Final = 0.1
 class QuietTime(NamedTuple):
     """A window in which the energy shows no load [time]; ``end`` is None if no later contact is seen.
 
-    It was found around ``td``.  ``settled`` is the time when the energy had settled; the time from there to ``start``
-    is left unused for safety.
+    The window was found around ``td``.  ``settled`` is the time when the energy had settled; the time from there to
+    ``start`` is left unused for safety.
     """
 
     start: float
@@ -78,7 +80,7 @@ class QuietTime(NamedTuple):
 
 
 def find_quiet_time(history: History, td: float) -> QuietTime | None:
-    """Find the window around ``td`` [time] in which the energy stays in its band on one level; None without any."""
+    """Find the window around ``td`` in which the energy keeps its level and its band; None if there is none [time]."""
     start = history.start
     after_td = int(np.searchsorted(history.time, td, side="right"))
     states = slice(0, after_td)
@@ -277,7 +279,8 @@ def find_settled_time(
     ----------
     time, energy : array of shape (n,)
     damped : array of shape (k, n), or None
-        Energies that damping lowers.  The level may fall by as much as one of them falls; without any, by any amount.
+        Energies that damping lowers.  The level may fall by as much as one of them falls; if there is none, by any
+        amount.
     start, end : float
         [time]
     unseen : float

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 LEAST_MARGIN: Final = 0.03
 # A momentum that changes by less than this share in a flight is constant except for rounding [-].
 _ROUNDING: Final = 1e-5
-# Smallest number of states in which a force is searched for.
+# A force is determined only from at least this number of states.
 _FEWEST: Final = 3
 # A small position error can move a grazing contact, in which surfaces slide along each other, to a much earlier time.
 # _GRAZING_FORCE: a contact grazes the body if its force stays below this share of the largest force on the body [-].
-# _GRAZING_MOMENTUM: a contact also grazes the body if it takes less than this share of the momentum towards it [-].
+# _GRAZING_MOMENTUM: a contact also grazes the body if it changes less than this share of the approach momentum [-].
 # A landing takes at least 25 % of the momentum in theory, and took at least 27 % in computed runs of cars and boxes.
 # The grazing contact of a computed car took 2 % of the momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
@@ -54,7 +54,7 @@ def compute_margin(
     place: float | None = None,
     turning: float | None = None,
 ) -> Margin:
-    """Return the margin before the contact at the end of a flight: the given one, or how much earlier it may come.
+    """Return the margin before the contact that ends a flight: the user's margin if there is one, or else an estimate.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 
@@ -117,7 +117,7 @@ def estimate_landing_spread(
 def estimate_grazing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    r"""Return how much earlier a grazing contact may come [time]: infinite without gravity, None if unknown.
+    r"""Return how much earlier a grazing contact may come [time]: infinite if there is no gravity, None if unknown.
 
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.

@@ -42,7 +42,7 @@ _VISIBLE = 100
 # A larger set of parts is preferred only if its window is longer by this factor [-].
 # A part with a large momentum, such as a sled, increases the tolerance for all parts and thus the length of windows.
 _LONGER = 1.1
-# _LOOK_BACK: share of the record before td that is searched for attached parts.
+# _LOOK_BACK: attached parts are determined in this share of the record before td [-].
 # _LOOK_STATES: largest number of states used for this search.
 # _CANCELS: the sum of the momenta of a body deviates from a straight line by less than this share [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
@@ -397,8 +397,8 @@ def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
     """Return the deformable parts that fly as one body; raise FormatError if the momenta do not show them.
 
     Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
-    car, which is the body to be switched.  The parts that the deck connects are tried; without a deck, or if none of
-    these flies by itself, the sets of `flying_together`.
+    car, which is the body to be switched.  The parts that the deck connects are tried; if there is no deck, or if none
+    of these flies by itself, the sets of `flying_together`.
     """
     deformable, momenta = _get_parts_and_momenta(run)
     flights = (
@@ -414,7 +414,7 @@ def find_flying_parts(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
-    """Return the deformable parts that fly together in one or more bodies; raise FormatError without any.
+    """Return the deformable parts that fly together in one or more bodies; raise FormatError if there are none.
 
     All parts are tried together, then each part that is in no set yet, with the parts attached to it.
     """

@@ -92,7 +92,7 @@ class Drift:
         """Return True if errors and angles are lower bounds, because internal motion looks like motion of the body.
 
         This is so if the part moves slowly, or if the motion of the others turns their frame by more than the body's
-        own angle, or, without a deck, moves them by a notable share of the part's motion.
+        own angle, or, if there is no deck, moves them by a notable share of the part's motion.
         """
         moved = float(
             np.sqrt(
@@ -459,7 +459,7 @@ def find_bodies_in_flight(
     flight : Flight
         With the parts that fly in it.
     told : sequence of RigidBody or None
-        According to a deck; without it the parts are assumed to become one body.
+        According to a deck; if there is no deck, the parts are assumed to become one body.
     placement : Placement, optional
         Places of the parts according to the deck.
     """

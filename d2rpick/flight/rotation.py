@@ -257,7 +257,7 @@ def find_moving_parts(
 
 
 class _Apart(NamedTuple):
-    """The fit without one part: the rotation of the others, their unexplained sum, and how far the part moves them."""
+    """Fit of a rigid rotation to all parts but one: the rotation, the misfit, and the effect of the omitted part."""
 
     part: int
     rate: Samples

@@ -88,11 +88,11 @@ class Turning(NamedTuple):
         return np.asarray(np.linalg.norm(moved, axis=1))
 
     def _find_front(self, direction: Samples) -> Samples:
-        """Return the place (3,) of the node that is farthest along a unit vector (3,) [length]."""
+        """Return the coordinates (3,) of the node that lies farthest in a given direction, a unit vector [length]."""
         return np.asarray(self.nodes[int(np.argmax(self.nodes @ direction))])
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """Return the rotation errors psi at td of a body that is rigid from ``tr`` (k,) on, (k, 3) [rad]."""
+        """Return the rotation errors psi at td of a body that is rigid since ``tr`` (k,), shape (k, 3) [rad]."""
         pushed, kept_turn = (
             _interpolate_at(self.time, turn, np.array([td]))
             - _interpolate_at(self.time, turn, tr)
@@ -106,7 +106,7 @@ class Turning(NamedTuple):
         )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements of a body that is rigid from ``tr`` on, (k, 3) in its own frame [length]."""
+        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body's frame [length]."""
         arm = _interpolate_at(self.time, self.arm, np.array([td]))
         return np.asarray(
             self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)

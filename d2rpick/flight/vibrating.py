@@ -34,7 +34,7 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     ----------
     history : History
     flight : Flight
-        Its parts fly together; a flight without parts has none.
+        The flight with all parts that fly together; if the flight names no parts, the result is empty.
     """
     if flight.parts is None or history.parts is None:
         return Beside()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
 # If the tolerance is reduced, windows of other smooth motions shrink to less than half, but not those of flights.
-# _STAYS: a window keeps its length if at least this share of the length remains [-].
+# _STAYS: share of its length that a window must retain to count as unchanged [-].
 # _STANDS: a window shrinks at one end only if its other end moves by at most this share of the length [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # For a vibration, the middle half of a window has at least this share of its misfit [-]; a smooth load leaves 1/8.
@@ -44,8 +44,8 @@ class FreeFlight(NamedTuple):
     """A window [time] in which ``parts`` fly freely together; None stands for the whole model.
 
     ``end_seen`` is False if the record ends while it still flies.  ``damping`` is alpha, the decay rate of the momentum
-    [1/time].  ``gravity`` is the acceleration taken as gravity: 0 without, NaN if nothing but its constancy shows it,
-    infinite if energies grow under a load of unknown size [length/time^2].
+    [1/time].  ``gravity`` is the acceleration taken as gravity: 0 if there is none, NaN if nothing but its constancy
+    shows it, infinite if energies grow under a load of unknown size [length/time^2].
     """
 
     start: float
@@ -172,7 +172,7 @@ def _find_converged_window(
     *,
     rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
-    """Find the window around the state ``at`` that hardly shrinks if the tolerance is divided by 10; None without any.
+    """Find the window around the state ``at`` that hardly shrinks at a tenth of the tolerance; None if there is none.
 
     The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
     returned: the misfit that the window may leave, and whether it first began with the record.
@@ -230,10 +230,10 @@ def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
 
 
 def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
-    """Return the first and last state of the longest window around the state ``at`` whose misfit is below ``room``.
+    """Return the first and last state of the longest window around a state whose misfit is at most ``room``.
 
-    Near an end of the flight a short window may reach across it.  The side grown first decides, so both orders are
-    tried.
+    Near an end of the flight, a short window may extend beyond the flight.  The window depends on the end that is
+    moved first, so both orders are tried.
     """
     last_state = law.time.size - 1
     first = find_farthest(at, 0, lambda i: law.misfit(i, at) <= room)

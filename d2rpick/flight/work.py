@@ -172,7 +172,7 @@ def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
 
 
 def find_balanced_window(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which only gravity and damping change the energy; None without any.
+    """Find the window around ``td`` [time] in which only gravity and damping change the energy; None if there is none.
 
     The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
     all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy

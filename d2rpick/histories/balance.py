@@ -99,7 +99,7 @@ def read_terms(databases: Sequence[Legs]) -> Balance | None:
 
 
 def read_momentum(database: Legs) -> Momenta | None:
-    """Return the momentum of the model, or its velocity with unknown mass; None if neither is written."""
+    """Return the momentum of the model, or its velocity if the mass is unknown; None if the files have neither."""
     has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
     if not has_components and not _find_global_velocities(database):
         return None

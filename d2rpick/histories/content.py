@@ -231,12 +231,12 @@ class OnDisk(Content):
         return self._digest
 
     def _fill(self, room: memoryview, begin: int) -> None:
-        """Fill ``room`` with the bytes from ``begin`` on."""
+        """Fill ``room`` with the bytes that start at ``begin``."""
         with self._lock:
             self._fill_from(self._file, room, begin)
 
     def _fill_from(self, file: FileIO, room: memoryview, begin: int) -> None:
-        """Fill ``room`` with the bytes of an open file from ``begin`` on."""
+        """Fill ``room`` with the bytes of an open file that start at ``begin``."""
         if read_into(file, room, begin) < len(room):
             raise self._shortened()
 

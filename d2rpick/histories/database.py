@@ -116,7 +116,7 @@ class Database:
         return {}
 
     def branch(self, name: str) -> Database:
-        """Return the branch of the whole model (``glstat``) or the parts (``matsum``); raise FormatError without it."""
+        """Return the branch of the model (``glstat``) or the parts (``matsum``); raise FormatError if it is missing."""
         reason = self.no_channels if name == "glstat" else self.no_parts
         raise FormatError(f"{self.source}: {reason}")
 
@@ -159,7 +159,7 @@ class Database:
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
-        """Return the precision of the times and of these channels; without channels, that of the parts."""
+        """Return the precision of the times and of these channels; if there are no channels, that of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 

@@ -41,7 +41,7 @@ _FIRST_STATES: Final = 10
 
 
 def round_as_read(time: float) -> float:
-    """Return the time that a user types after reading this time with six digits.
+    """Round a time to the six digits with which it is printed, because users type printed times.
 
     Examples
     --------
@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return a question that asks if an argument was meant in a unit; it contains the values to give instead."""
+    """Ask the user whether an argument was meant in another unit, and name the values in the unit of the record."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

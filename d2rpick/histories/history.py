@@ -271,7 +271,7 @@ class History:
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly. Anything else
     raises HistoryError. ``source`` are the file names as the user gave them; ``channel`` names what is used as the
-    energy; ``parts`` are the parts whose energy it is, None for the whole model; ``springs`` are those of them whose
+    energy; ``parts`` are the parts whose energy it is, or None for the whole model; ``springs`` are those of them whose
     energy is left out; ``energy_format`` is the format of the file with the energy. ``complete`` is False if a file
     ends within a state; ``notes`` are for the user; ``files`` were read. ``time_unit`` and
     ``energy_unit`` are empty unless the file names them. ``evidence`` shows when parts fly freely; the evidence of a
@@ -391,7 +391,7 @@ class History:
         return f"; in the same folder are {', '.join(legs)}, later restart segments of the run? Name them too"
 
     def check(self, *times: float, argument: str = "", subject: str = "") -> None:
-        """Raise RangeError unless all times are in the record.
+        """Raise RangeError if a time lies outside the record.
 
         The message names the ``argument`` that the user gave, or else describes the times as the ``subject``.
         """

@@ -256,7 +256,7 @@ def find_printed_steps(
     Parameters
     ----------
     run : Run
-        Its glstat is searched.
+        Run whose glstat is examined.
     *neighbours : str
         Files whose folders are searched for a d3hsp too.
 

@@ -24,7 +24,7 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of a match between a name and a quantity, from the best to the worst.
+# Ranks of how well a column name matches a quantity, from the best to the worst.
 # The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1

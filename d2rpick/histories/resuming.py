@@ -17,7 +17,7 @@ class ResumePoint(NamedTuple):
     end: int
 
     def read_on(self, name: str) -> bytes:
-        """Return the header, and the bytes of a file from ``begin`` on; raise OSError if it cannot be read."""
+        """Return the header, and the bytes of a file after ``begin``; raise OSError if it cannot be read."""
         with open(name, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             stream.seek(self.begin)
             return self.head + stream.read()

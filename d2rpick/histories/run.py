@@ -376,7 +376,7 @@ class OpenedRun:
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        # Only springs have energy.
+        # If no other part has energy, the springs are not left out.
         if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [
@@ -418,7 +418,7 @@ class OpenedRun:
         )
 
     def _of_all_parts(self) -> History:
-        """Return the history of the summed energy of all parts; raise FormatError without parts."""
+        """Return the history of the summed energy of all parts; raise FormatError if there are no parts."""
         if not self.parts:
             channels = [
                 name for database in self.databases for name in database.channels

@@ -200,7 +200,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median of the positive time steps, without equal printed times; NaN if there are no such steps."""
+    """Return the median of the time steps, ignoring steps between equal printed times; NaN if none remains."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 

@@ -382,7 +382,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its restart segment, which is 0 without a number."""
+    """Split a file name into its stem and the number of its restart segment, which is 0 if there is no number."""
     match = _NUMBERED.fullmatch(name)
     # The match is never None, because the pattern matches any text
     assert match is not None

@@ -228,7 +228,7 @@ class RigidPoints:
         return self.velocity + 1j * self.spin * self.arms
 
     def push(self, forces: Plane, damping: float, dt: float) -> None:
-        """Change the motion by forces on the points (n,) [N] and damping [1/s] during a time step [s]."""
+        """Advance velocity and spin by a time step [s] under the forces on the points (n,) [N] and damping [1/s]."""
         half = damping * dt / 2
         moment = float(np.vdot(self.arms, forces).imag)
         self.velocity = (

@@ -75,7 +75,7 @@ class Record(NamedTuple):
 
     @property
     def landed(self) -> float | None:
-        """Time of the first contact force of the ground [s]; None without one."""
+        """Time of the first contact force of the ground [s]; None if there is none."""
         return self.landings[0][0] if self.landings else None
 
     @property

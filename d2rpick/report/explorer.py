@@ -276,7 +276,7 @@ def _compute_saved_percentage(offer: Offer) -> float | None:
 
 
 def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty without a window.
+    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty if there is no window.
 
     The mask has the same length for any number of windows, of which noise makes many, and is finer than a screen.
     """

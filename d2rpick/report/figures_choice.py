@@ -373,7 +373,7 @@ def draw_run(
 
 
 def draw_parts(answer: Parts) -> Figure:
-    """Draw the energies of the parts with the largest energy, and the flights; raise FormatError without parts."""
+    """Draw the flights and the largest energies of parts; raise FormatError if there are no parts."""
     run = answer.files
     energies = run.part_energies(run.parts)
     time = run.part_time

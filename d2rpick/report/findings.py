@@ -85,7 +85,7 @@ class Checks:
     """The findings in several decks; paths below ``root`` are shown relative to it.
 
     ``failed`` lists the decks that could not be read.  ``history`` lists the files from which the windows were judged;
-    None without any.  Findings less severe than ``fail_on`` are not failures.
+    None if there is none.  Findings less severe than ``fail_on`` are not failures.
     """
 
     results: Sequence[Checked]

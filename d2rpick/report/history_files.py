@@ -23,7 +23,7 @@ _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 
 def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
-    """Return the format for a file name: csv without a name; raise FormatError if the name does not determine one.
+    """Return the format for a file name, csv if there is no name; raise FormatError if the name determines none.
 
     The suffix determines the format.  A name without a known suffix must be or contain the name of a solver's database.
 

@@ -94,7 +94,7 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# fields on the position of the rigid body at td, which is estimated from single parts
+# JSON fields with the position error of a rigid body at td, which is estimated from the motion of its parts
 _POSITION: Final = (
     Field("position_error", "size?",
           "position error of a rigid body at td, caused by a part that is frozen in another position [length]; for "
@@ -334,7 +334,7 @@ FRAME: Final = (
 
 
 def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Return the fitted oscillator; None if no oscillator was searched for."""
+    """Return the fitted oscillator; None if no oscillator was fitted."""
     fit = situation.evidence.fit
     if fit is None:
         return None

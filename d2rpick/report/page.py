@@ -312,8 +312,8 @@ class PageContext(NamedTuple):
 
     ``run`` is the input, ``switched`` a finished switched run.  ``command`` repeats the answer; ``judging`` are the
     options of ``card`` that select the same history.  ``printing`` is how the card of a recommended
-    or verified pair is printed; ``card`` is None without parts to switch, or if ``refusal`` says why it cannot be
-    printed.  ``explorer`` makes the page interactive.
+    or verified pair is printed; ``card`` is None if there are no parts to switch, or if ``refusal`` says why it cannot
+    be printed.  ``explorer`` makes the page interactive.
     """
 
     run: OpenedRun
@@ -428,7 +428,7 @@ def list_deck_digests(
 
 
 def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
-    """Return the digests of the deck that an answer uses; nothing without a deck."""
+    """Return the digests of the deck that an answer uses; nothing if there is no deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
 
@@ -454,7 +454,7 @@ def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup
 
 
 def build_command(command: Sequence[str], stdin: bool = False) -> PageSection:
-    """Return the arguments that repeat an answer as a command line that can be pasted into a shell."""
+    """Return the section with the shell command that repeats the answer."""
     stdin_note = (
         [make_element("p", "with the same history on standard input:")] if stdin else []
     )

@@ -200,7 +200,7 @@ def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
-    """Return CSV with all offers and a column for each key of ``offers`` in the JSON output that is a single value."""
+    """Return CSV with a row for each offer and a column for each key of ``offers`` in JSON that has a single value."""
     return write_csv(COLUMNS, map(OFFER.plain, trade_off.offers))
 
 
@@ -264,7 +264,7 @@ def _explain_why_no_pair(trade_off: TradeOff) -> str:
 
 
 def _describe_distance(start: Offer, step: Offer, unit: str) -> str:
-    """Describe how far away the other td is, with its value."""
+    """Describe the distance of another td from the chosen td, and the pair at the other td."""
     apart = step.td - start.td
     size = f"{abs(apart):.2g} {unit}".rstrip()
     return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"

@@ -231,7 +231,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures of the switched run by name; empty without a switched run."""
+    """Return the measures of the switched run by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

@@ -91,7 +91,7 @@ def make_scale(low: float, high: float, level: float) -> Scale:
 def make_scale_of_flight(
     situation: Situation, view: View, levels: Sequence[float]
 ) -> Scale:
-    """Return the scale for a flight and its levels; without a vibration, for the energy of the whole run."""
+    """Return the scale for a flight and its levels; if there is no vibration, for the energy of the whole run."""
     if situation.at_rest:
         return make_scale(
             0.0,
@@ -226,7 +226,7 @@ class Response(NamedTuple):
 
 
 def compute_response(situation: Situation) -> Response | None:
-    """Return the response of the single oscillator that describes the record; None without such an oscillator."""
+    """Return the response of the single oscillator that describes the record; None if there is none."""
     mode = situation.vibration.whole.mode
     span = situation.evidence.span
     td = situation.td

@@ -264,7 +264,7 @@ def check_deck(
     configuration : Configuration, optional
         Selected rules and their severities; default: all rules as they are.
     judge : HistoryJudge, optional
-        Judges the windows by an energy history; without one the energy rules find nothing.
+        Judges the windows by an energy history; if there is no history, the energy rules find nothing.
     content : bytes, optional
         Content of the deck, if it is not a file.
     restarts : sequence of str, optional
@@ -311,7 +311,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Return the findings without consequences of a wrong unit or time that another rule reports."""
+    """Leave out findings that only follow from a wrong unit or time which another rule reports."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {

@@ -48,7 +48,8 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-_BY_FORCE = {1, 2, 3, 4}  # values of CODE of the switch sets that wait for a force
+# Values of CODE with which a switch set waits for a contact or wall force.
+_BY_FORCE = {1, 2, 3, 4}
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -161,7 +162,7 @@ class Case:
 
     @cached_property
     def judgements(self) -> tuple[tuple[SwitchWindow, Judgement], ...]:
-        """Return the windows with their judgements by the history; empty without a history."""
+        """Return the windows with their judgements by the history; empty if there is no history."""
         if self.judge is None:
             return ()
         windows = self.windows.windows
@@ -187,7 +188,7 @@ class Case:
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the switches by a force, with their switching times in the history; empty without a history."""
+        """Return the switches by a force, with their switching times in the history; empty if there is no history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):

@@ -45,7 +45,7 @@ def follow_sensed_switches(
     judge: HistoryJudge | None,
     end: float,
 ) -> Iterator[Sensed]:
-    """Yield the CODE 5 sets of an LS-DYNA deck with their controls; without a history only time is evaluated."""
+    """Yield the CODE 5 sets of an LS-DYNA deck with their controls; if there is no history, only time is evaluated."""
     controls = {control.switch_set: control for control in read_controls(deck)}
 
     def find_spans(kind: str, number: int, least: float) -> Spans | None:

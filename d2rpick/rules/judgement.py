@@ -1,6 +1,6 @@
 """Judge the windows of a deck by the energy history of a reference run, with the code of ``verify``.
 
-The rules do not import this module: without a history the check needs no numerics and starts faster.
+The rules do not import this module, because a check that has no history needs no numerics and so starts faster.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Judgement(NamedTuple):
 
 @dataclass
 class HistoryJudge:
-    """Judges windows by a reference run: by the energy of the switched parts, or of the whole model without part data.
+    """Judges windows by the energy in a reference run: of the switched parts, or of the model if part data are missing.
 
     The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
@@ -95,7 +95,7 @@ class HistoryJudge:
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def use_deck(self, deck: str) -> None:
-        """Use the supports, gravity and joints of this deck for the next judgements; without parts there are none."""
+        """Use the supports, gravity and joints of a deck for the next judgements; none are known if it has no parts."""
         try:
             inventory = read_inventory(deck)
         except DeckError:
@@ -133,7 +133,7 @@ class HistoryJudge:
         )
 
     def _reference(self, parts: tuple[int, ...]) -> Reference:
-        """Return the reference run with the energy of given parts, or of the whole model without parts."""
+        """Return the reference run with the energy of given parts, or of the model if no parts are given."""
         if parts not in self._references:
             if parts:
                 chosen = self.selection._replace(parts=tuple(map(str, parts)))

@@ -80,7 +80,7 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
 
 
 def _make_run_with(*more: str) -> Example:
-    """Return a good run whose starter deck also contains these cards."""
+    """Return an example run that satisfies all rules, with these additional cards in the starter deck."""
     return make_run(_LEGS, write_starter_deck(more="".join(more)))
 
 

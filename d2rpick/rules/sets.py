@@ -147,7 +147,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
 
 
 def _find_swapped(case: Case) -> Iterator[tuple[SwitchHeader, str]]:
-    """Yield the header of each set that makes parts rigid under a force if another set releases them without it."""
+    """Yield each set that makes parts rigid while a force acts, if another set releases them when no force acts."""
     rigid_sets = [
         (card, header)
         for card, header in case.headers

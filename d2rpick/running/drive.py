@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
-# With 5 times the time step, a rigid leg costs a few percent of a deformable leg, and still shows a contact.
+# With 5 times the time step, a rigid leg costs a few percent of a deformable leg, and its contacts stay visible.
 _STEP_RATIO: Final = 5.0
 # A flight that is too short to be switched is reported if it lasts for at least this share of the required time [-].
 _REPORTED: Final = 0.5
@@ -357,7 +357,7 @@ class Observer:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose as tr the start or the end of a leg, whichever has the higher internal energy and is in flight [time]."""
+    """Choose as tr the start of a leg if it is in flight and has more internal energy than the end; else the end."""
     start = max(order.start, float(history.time[0]))
     falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
     starts_in_flight = order.start >= max(free, order.switch_after)
@@ -397,7 +397,7 @@ class Journal:
         return [event for event in events if event in outcomes][-1:] == ["failed"]
 
     def has(self, event: str) -> bool:
-        """Return True if there is a record of an event."""
+        """Return True if the journal contains a record of the named event."""
         return any(record["event"] == event for record in self.records)
 
     def add(self, event: str, **values: Any) -> None:

@@ -107,7 +107,7 @@ class Commands(NamedTuple):
 
 
 def _find_installed(program: str) -> str:
-    """Return the command of a program of the installation; raise ConfigurationError without one."""
+    """Return the command of a program of the installation; raise ConfigurationError if it is not installed."""
     home = os.environ.get(_HOME, "")
     names, arguments = _PROGRAMS[program]
     for name in names:
@@ -257,7 +257,7 @@ class Solver:
         return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
-        """Return True if a leg, or the starter (0), has left complete restarts of all domains.
+        """Return True if a leg, or the starter (number 0), has left complete restarts of all domains.
 
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -330,7 +330,7 @@ class Solver:
         return {path.name[-8:]: path for path in paths}
 
     def _measure_largest_restart(self) -> int:
-        """Return the size of the largest restart file of the run [bytes]; 0 without any."""
+        """Return the size of the largest restart file of the run [bytes]; 0 if there is no restart file."""
         sizes = (status.st_size for status in self._list_status("_*.rst"))
         return max(sizes, default=0)
 

@@ -187,7 +187,7 @@ class GrowingEvidence:
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
-        """Return when the force-free time that lasts up to a time began; without states, return that time itself."""
+        """Return the start of the force-free time that lasts up to a time; if there are no states, return the time."""
         starts = [time]
         for witness in self._witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1

@@ -135,7 +135,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given waiting time, or half of the longest period in the deck; raise ArgumentError without either."""
+    """Return the given waiting time or half of the deck's longest period; raise ArgumentError if both are unknown."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
@@ -290,7 +290,7 @@ def _make_ls_dyna_card(
 
 
 def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
-    """Return id and keyword of the contact that a switch can wait for; raise DeckError without one or if loads act."""
+    """Return id and keyword of the contact for which a switch can wait; raise DeckError if there is no such contact."""
     for card in deck.cards:
         if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
             raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")

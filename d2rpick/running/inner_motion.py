@@ -168,7 +168,7 @@ class _Motion:
 class EvidenceOfForces(Protocol):
     """The part of the evidence of a growing record that is needed to follow inner motion."""
 
-    # Slices of the latest states, each with the column numbers of the parts that move in it; () without momenta.
+    # Slices of the latest states, each with the columns of the parts that move in it; () if there are no momenta.
     moving: list[tuple[slice, tuple[int, ...]]]
 
     @property
@@ -180,9 +180,10 @@ class EvidenceOfForces(Protocol):
 
 
 class _Longest(NamedTuple):
-    """The longest half period, its source, its end ``over``, and the time ``since`` when it has been known [time].
+    """The longest half period of the inner motion so far [time], and the part or energy that showed it.
 
-    ``strength`` is the strongest mean change by time so far, ``swing`` half of the longest swing, pushed or not [time].
+    ``since`` is the time of detection, ``over`` the end of the half period. ``strength`` is the largest mean rate of
+    change so far. ``swing`` is half of the longest swing, even if a force pushed the swing [time].
     """
 
     since: float

@@ -278,7 +278,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Return the window before the contact that the last leg has shown; without a contact, up to the end of the run."""
+    """Return the window before the contact that the last leg showed; if it showed none, up to the end of the run."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     free, wait = findings.free, findings.wait or 0.0

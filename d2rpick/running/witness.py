@@ -60,7 +60,7 @@ class Quiet(NamedTuple):
     gravity : float
         Acceleration, as in `FreeFlight`.
     parts : tuple of Part or None
-        Parts that fly together; None for the whole model.
+        Parts that fly together; None means the whole model.
     level : float or None
         Time at which the centre of mass is again as high as at ``start`` [time]; None if that was before ``seen``.
     """
@@ -92,7 +92,7 @@ class GrowingWitness:
     members : tuple of int
         Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
     free : list of int
-        For each state, the first state from which on no force shows up to it.
+        For each state, the first state of the force-free time that lasts up to it.
     flights : list of Quiet
         Flights so far.
     pauses : list of (float, float)
@@ -157,7 +157,7 @@ class GrowingWitness:
         )
 
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the state, not before ``earliest``, from which the states up to ``last`` show no force."""
+        """Return the first state, at or after ``earliest``, after which no force acts until the state ``last``."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(
@@ -169,7 +169,7 @@ class GrowingWitness:
         needed: Needed,
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
-        """Add the flights that are seen at the new states, and the ends of earlier force-free times.
+        """Update the lists of flights and of ended force-free times with the new states.
 
         ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
         """

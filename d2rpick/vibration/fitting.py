@@ -116,8 +116,8 @@ def fit_all(
 ) -> Samples | None:
     """Return the best fit to all samples, starting from the ``best`` fit to a selection of them.
 
-    None without a start, or if ``worst`` is finite and some of the samples are left with too much structure.  A fit
-    that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
+    None if there is no start, or if ``worst`` is finite and some of the samples are left with too much structure.  A
+    fit that leaves far too much is not refined for all samples, nor is a drift: both will be refused and would converge
     slowly.
     """
     if best is None or s.size <= COARSE:
@@ -195,7 +195,9 @@ class Pencil(NamedTuple):
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
     def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
-        """Return the complex rates p = -damping + i frequency of exp(p s) that E may contain, frequency > 0.
+        """Return the complex rates p of the oscillating terms exp(p s) that the energy may contain.
+
+        The real part of p is minus the damping, the imaginary part is the positive frequency.
 
         ``orders`` are the numbers of exponentials to try.
         """

@@ -62,7 +62,7 @@ class Identification(NamedTuple):
     misfit : float or None
         rms(E - fit) / std(E) over the window [-].
     rms : float
-        rms(E - fit) [energy]; NaN without a mode, as is ``structure``.
+        rms(E - fit) [energy]; NaN if there is no mode, as is ``structure``.
     structure : float
         The part of ``rms`` that neighbouring samples share and white noise does not leave [energy].
     start, end : float
@@ -70,9 +70,9 @@ class Identification(NamedTuple):
     covariance : array of shape (p, p)
         Of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
     vibration : float
-        Root mean square of the vibration energy over the window [energy]; NaN without a mode.
+        Root mean square of the vibration energy over the window [energy]; NaN if there is no mode.
     hidden_share : float
-        Share of the vibration energy that a hidden further mode may have [-]; zero if none was searched for.
+        Share of the vibration energy that a hidden further mode may have [-]; zero if no further mode was tested.
     deviation_times, deviations : array of shape (d,)
         How far the energy is off the fit at some times, beyond noise [time], [energy]; empty if it was not measured.
     follows : bool
@@ -98,7 +98,7 @@ class Identification(NamedTuple):
     plausible: bool = False
 
     def energy_deviation(self, times: Samples | float) -> Samples:
-        """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN without a mode.
+        """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN if there is no mode.
 
         To first order in the errors of the parameters, the root of the diagonal of J C J^T.
         """
@@ -137,7 +137,7 @@ def identify(
 
     Notes
     -----
-    The energy is that of eqs. (1) and (7) of "Analysis of switched-rigid floating oscillator" (Shock and
+    The energy is that of equations (1) and (7) of "Analysis of switched-rigid floating oscillator" (Shock and
     Vibration), E = k (y - z)**2 / 2, extended by plastic work and a preload.  Overdamped motion shows no rate
     and cannot be identified.
 

@@ -27,7 +27,7 @@ _LOOSE_TURNS: Final = 0.5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of R^2 for one interpretation (``reading``) of the lines that were fitted to a ``grid``.
+    """Standard deviation of R^2 for one interpretation (``reading``) of the spectral lines of the energy on a ``grid``.
 
     Neighbouring states have the share ``systematic`` of the misfit in common [-].
     """

@@ -47,7 +47,7 @@ _ABOVE_NOISE: Final = 20.0
 # _ALL_POWER: the slowest lines that together have this share of the power are relevant [-].
 # _STRONG_POWER: the slowest lines that together have this share of the power are strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# Lines that decay early are searched for in this first part of the record, given as a share of it [-].
+# The search for early decaying lines uses this first part of the record, given as a share of the record [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
 # _MOST_DAMPED: largest damping of a line, as a share of its angular frequency [-].
@@ -56,7 +56,7 @@ _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 40.0
 # Largest exponent with which a vibration seems to grow over the record because of noise [-].
 _MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference of two decays, as exponents over the record [-].
+# _SAME_DECAY: smallest difference between the decay exponents of two exponentials over the record [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 

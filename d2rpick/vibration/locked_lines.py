@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # ABOVE_SCATTER: smallest height of a relevant line, in standard deviations [-].
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
 # _SAME_RATE: two rates are treated as equal if they differ by less than this share of a cycle over the record [-].
-# _EXACT_RATE: two rates are exactly equal if they differ by less than this angle over the record [rad].
+# _EXACT_RATE: two rates are treated as identical if their phases drift apart by less than this in the record [rad].
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # _SAME_PHASE: largest phase error of a line that is locked because of a static deformation [rad].
 # _SAME_PHASE_OF_HARMONICS: largest phase error of a harmonic [rad].
@@ -32,8 +32,8 @@ _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
 # Two heights are treated as equal if the logarithm of their ratio is below this.
 _SAME_HEIGHT: Final = 0.1
-# _STRONGEST: number of the strongest lines whose harmonics are searched for.
-# _HARMONICS: orders of the harmonics that are searched for.
+# _STRONGEST: the search for harmonics is limited to this number of the strongest lines.
+# _HARMONICS: orders of the harmonics of these lines that are identified.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
@@ -57,8 +57,8 @@ def find_stretches(
     """Find the lines of modes that vibrate about a static deformation, as in a rotating body.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
-    In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
-    A stretch that swings itself, as that of a part on a hinge, has two such lines, one on each side.
+    In free flight of a body that does not spin, the energy is stationary at rest, whatever the residual stress, and has
+    no such line. A stretch that swings itself, as that of a part on a hinge, has two such lines, one on each side.
     """
     size = np.abs(lines.weights)
     rate = lines.poles.imag

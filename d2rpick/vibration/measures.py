@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     # Measures of n times, as arrays of shape (n,) by name, with NaN for unknown values.
     Columns = Mapping[str, Samples]
     # Function that returns the residual of each tr with its lower and upper bound [-].
-    # Its arguments are the residual of the deformations, tr, and td.
+    # The function takes the residuals computed from the deformations, the times tr, and td.
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
 # Increase of the frozen-deformation error that ``timing_tolerance`` allows [-].
 TOLERATED_GROWTH = 0.05
-# Factor on the damping ratio that gives the part of R^2 that depends on the phases at td [-]; theory allows up to 2.
+# The part of R^2 that depends on the phases at td is this factor times the damping ratio [-]; theory allows up to 2.
 _PHASES_COUNT = 1.5
 
 
@@ -133,7 +133,7 @@ def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
 
     Of the shape of ``td``.
 
-    V = T + (q - q0)^2 is the energy of the vibration about the preload q0; without preload V = T + E.
+    V = T + (q - q0)^2 is the energy of the vibration about the preload q0; if there is no preload, V = T + E.
     """
     return np.asarray(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
@@ -211,7 +211,7 @@ def wrong_sign(kinetic: float) -> float:
 def run_time_share(
     rigid_fraction: float, cost_share: float, step_ratio: float
 ) -> float:
-    """Return the expected run time of the switched run relative to that of the reference, 1 - f (1 - (1 - c)/n) [-].
+    """Return the expected run time of the switched run divided by that of the reference run, 1 - f (1 - (1 - c)/n) [-].
 
     In the rigid window, a fraction f of the run, the share c of a step's cost that the switched parts' elements need is
     saved, and there are n times fewer steps.
@@ -323,7 +323,7 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Return the interval between the samples on both sides of ``at``; infinite without two samples [time]."""
+        """Return the interval between the samples around ``at`` [time]; infinite if there are fewer than two."""
         if self.time.size < 2:
             return np.full(np.shape(at), np.inf)
         next_state = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)

@@ -129,7 +129,7 @@ class Reading:
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X without limits; because of noise or a wrong model it may exceed its bounds [energy]."""
+        """Return X, not limited to its bounds, which noise or a wrong model may make it exceed [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)

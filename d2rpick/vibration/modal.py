@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Spectral lines are searched for only in records with at least this many states.
+# Spectral lines are identified only in records with at least this number of states.
 _FEWEST_STATES: Final = 32
 # A static energy below this share of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
@@ -199,15 +199,15 @@ class ModalVibration:
     Parameters
     ----------
     time : array of shape (n,)
-        Times at which the deformation is looked at, close enough for every line [time].
+        Times at which the deformation is computed, close enough for the fastest line [time].
     reading : Reading
-        How the lines are read.
+        Chosen interpretation of the lines.
     others : tuple of Reading
-        Other readings that the record allows.
+        Other interpretations of the lines that the record allows.
     of_first_part : Reading
         What the first part of the record says.
     doubts : Doubts
-        What speaks against it.
+        Measures of what speaks against the chosen interpretation.
     noise : float
         Scatter of the record about its lines [energy].
     systematic : float
@@ -217,11 +217,12 @@ class ModalVibration:
     scatter : LineScatter
         Scatter of R^2 that follows from that of the record.
     swinging : float
-        Mean energy of stretches that swing, which no mode has [energy].
+        Mean energy in parts of the record that swing in a way that no mode does [energy].
     bent : float
-        Second harmonic of a line that is, or may be, that of a stiffening spring, over the line; 0 without one [-].
+        Second harmonic of a line that is, or may be, that of a stiffening spring, relative to the line; 0 if there is
+        none [-].
     source : str
-        The energy that the lines were found in.
+        Name of the energy that contains the lines.
     second : ModalVibration or None
         What the lines of the kinetic energy say, beside those of the internal energy.
     last_resort : bool
@@ -369,7 +370,7 @@ class ModalVibration:
     ) -> tuple[Samples, Samples, Samples]:
         """Return the error of R^2 for pairs of times, and how much lower and higher other interpretations are [-].
 
-        Alternatives are other readings of the lines, and what the kinetic energy says: each is on one side.
+        Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
         """
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
@@ -463,10 +464,10 @@ class ModalVibration:
     def _compute_shift_of_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> tuple[Samples, Samples]:
-        """Return how far R^2 is lower, and how far it is higher, if another interpretation of the lines is correct [-].
+        """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
 
-        In the best interpretation with a static energy, some of that may be lines hidden in the misfit: no more of it
-        than these can hold, and no more than all.
+        Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
+        that the misfit can hide, and by the static energy itself.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
@@ -491,8 +492,8 @@ def identify_modal(
 ) -> ModalVibration | None:
     """Identify the modes of a structure from its energy in free flight; None if it has no lines.
 
-    The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in it is slow:
-    the sum of elastic and kinetic energy of a mode falls without a swing.
+    The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in the kinetic
+    energy changes slowly: the sum of elastic and kinetic energy of a mode falls monotonically.
 
     Parameters
     ----------
@@ -724,7 +725,7 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
 
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """Return by how much the overlap exceeds its bounds, over the vibration energy (rms over pairs of times) [-]."""
+    """Return the excess of the overlap over its bounds, relative to the vibration energy (rms over pairs) [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T

@@ -22,9 +22,9 @@ _PARTS: Final = 16
 # Windows that reach the end of the record begin at these shares of it.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window, the record follows the modes as long as means over a part of the fastest period deviate little.
-# _MEANS_PER_PERIOD: number of means per period of the fastest mode.
-# _MOST_OFF: largest deviation of a mean, as a share of the vibration energy [-].
-# _SCATTERS_OFF: largest deviation of a mean, in standard deviations of such means.
+# _MEANS_PER_PERIOD: number of energy means that are checked in each period of the fastest mode.
+# _MOST_OFF: largest deviation of an energy mean from the modes, as a share of the vibration energy [-].
+# _SCATTERS_OFF: largest deviation of an energy mean from the modes, in standard deviations of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
 # Largest number of times that a window is extended and identified again.
 _MOST_REFITS: Final = 3

@@ -343,7 +343,7 @@ def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 class Evidence(NamedTuple):
     """The models that were found in a record, whether or not they are reliable at a td.
 
-    ``fit`` is None only if no oscillator was searched; ``span`` is the window that it describes.  ``given`` is True for
+    ``fit`` is None only if no oscillator was fitted; ``span`` is the window that it describes.  ``given`` is True for
     a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
     tells the sign.
     """
@@ -356,12 +356,12 @@ class Evidence(NamedTuple):
 
     @property
     def signed(self) -> str | None:
-        """Return the name of the model that gives the sign of the deformation; None without such a model."""
+        """Return the name of the model that gives the sign of the deformation; None if there is no such model."""
         return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
     def refusal(self) -> str | None:
-        """Return the reason why modes could not be identified; None if they were, or were not searched for."""
+        """Return the reason why modes could not be identified; None if they were identified, or not needed."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.refusal if modal and not modal.signed else None
 
@@ -373,13 +373,13 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the states per period of the fastest line of the energy [-]; None if no lines were searched for."""
+        """Return the states per period of the fastest line of the energy [-]; None if lines were not identified."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def states_per_strong_period(self) -> float | None:
-        """Return the states per period of the fastest strong line [-]; None if no lines were searched for."""
+        """Return the states per period of the fastest strong line [-]; None if lines were not identified."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 

@@ -45,7 +45,7 @@ class Mode(SignedAmplitudes):
     ----------
     omega : float
         Damped angular rate of the deformation, positive [1/time]; the energy repeats at twice that rate.
-        omega_2 of eq. (4).
+        omega_2 of equation (4) of the paper.
     alpha : float
         Mass-proportional damping [1/time].
     cosine, sine : float
@@ -59,7 +59,7 @@ class Mode(SignedAmplitudes):
 
     Notes
     -----
-    "Analysis of switched-rigid floating oscillator" (Shock and Vibration), eqs. (1), (4), (7).
+    "Analysis of switched-rigid floating oscillator" (Shock and Vibration), equations (1), (4) and (7).
 
     Examples
     --------

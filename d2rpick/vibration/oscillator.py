@@ -6,8 +6,8 @@ module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended ma
 
 The closed forms here take any initial state.  They split the motion into the centre of mass, which damping
 alone slows down, and the spring deformation ``r = y - z`` with ``r'' + alpha r' + omega_0^2 r = 0``.  The
-paper's formulas (7) are the case z = y = y' = 0, z' = V0; its spring-back (18) is the free motion that starts
-from the frozen deformation with both masses at one speed.  A `Replay` runs it through tr and td.
+paper's equations (7) are the case z = y = y' = 0, z' = V0; the spring-back, equation (18), is the free motion that
+starts from the frozen deformation with both masses at one speed.  A `Replay` runs it through tr and td.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Oscillator:
 
     @property
     def omega_2(self) -> float:
-        """Return the damped rate of the vibration, eq. (4) [1/time]; NaN if overdamped.
+        """Return the damped rate of the vibration, equation (4) of the paper [1/time]; NaN if overdamped.
 
         Examples
         --------
@@ -94,7 +94,7 @@ class Oscillator:
         return float(np.sqrt(square)) if square >= 0 else float("nan")
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
-        """Return the state after the time ``elapsed`` of free motion from ``start``, with any damping, eqs. (7), (18).
+        """Return the state after ``elapsed`` of free motion from ``start``, equations (7) and (18) of the paper.
 
         Parameters
         ----------
@@ -176,11 +176,11 @@ class Oscillator:
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
         for column, value in zip(states, start, strict=True):
-            column[:1] = value  # The first value equals the given one exactly.
+            column[:1] = value  # The first value equals the initial value exactly.
         return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
-        """Return the state after the time ``elapsed`` of rigid motion that begins at ``start``, eqs. (8) to (12).
+        """Return the state after ``elapsed`` of rigid motion from ``start``, equations (8) to (12) of the paper.
 
         At the switch momentum is kept, the relative velocity is lost and the deformation is frozen, so
         ``rigid(start, 0)`` is the state right after the switch.  Arguments as in ``free``.
@@ -215,7 +215,7 @@ class Oscillator:
         return mass / (self.frame_mass + self.mass)
 
     def _centre(self, state: State) -> tuple[Values, Values]:
-        """Return the displacement and the velocity (8) of the centre of mass."""
+        """Return the displacement and the velocity of the centre of mass, equation (8) of the paper."""
         frame = self._share(self.frame_mass)
         suspended = self._share(self.mass)
         return (
@@ -274,7 +274,7 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Return the energy mode of ``oscillator`` that is at rest at time 0 except for the frame velocity ``v0``, eq. (7).
+    """Return the energy mode of ``oscillator`` that starts at rest except for the frame velocity ``v0``.
 
     Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
     squared.
@@ -313,11 +313,11 @@ class Replay:
             )
 
     def reference(self, time: Values | float) -> State:
-        """Return the states of the run without switching at ``time``, eq. (7) of the paper."""
+        """Return the states of the run without switching at ``time``, equation (7) of the paper."""
         return self.oscillator.free(self.start, np.asarray(time) - self.origin)
 
     def motion(self, time: Values | float) -> State:
-        """Return the states of the switched run at ``time``: free, eq. (7), rigid, eqs. (9)-(12), free again, eq. (18).
+        """Return the states of the switched run at ``time``: equations (7), (9) to (12), and (18) of the paper.
 
         At tr itself, the state after the switch.
         """

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Half-width of the error band of R^2 due to noise, in standard deviations.
 _DEVIATIONS: Final = 2.5
-# Largest effect on R^2 of a hidden mode that does not change the stated residual, but only its upper bound [-].
+# A hidden mode with at most this effect on R^2 raises only the upper bound of the residual, not its value [-].
 _HARMLESS: Final = 0.25**2
 # Effect on R^2 of a hidden share that consists of harmonics of a nonlinear spring, as a factor on this share [-].
 _HARMONIC_COUNTS: Final = 8.0

@@ -169,8 +169,8 @@ def find_described_span(
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last one before td.
 
-    First a part of the record that one oscillator describes is searched for, long ones first.  Then the window grows
-    both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
+    First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
+    grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
 
     Parameters
     ----------
@@ -212,8 +212,8 @@ def find_longest_described(
 ) -> tuple[Span, Identification] | None:
     """Find a window with most of the ``bounds`` that one oscillator describes; None if none is found.
 
-    The window is the same for every td in it.  It is searched for in the middle of the bounds, which it contains.  A
-    smaller window is found only from its td.  ``whole`` has the same meaning as in `find_described_span`.
+    The window is the same for every td in it.  The search starts in the middle of the bounds, which the window
+    contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `find_described_span`.
     """
     start, end = bounds
     middle = (start + end) / 2
@@ -333,7 +333,7 @@ def _find_first_off(
     behind: int,
     ahead: int,
 ) -> int | None:
-    """Return the index of the first mean, from ``first`` on, that exceeds its limit.
+    """Return the index of the first mean, at or after index ``first``, that exceeds its limit.
 
     The search goes outwards block by block, so that no sum contains the large errors beyond the end of the window.
     """
@@ -353,7 +353,7 @@ def _find_first_off(
 
 
 def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Samples:
-    """Return means of ``behind`` values before each value and ``ahead`` after it, from ``first`` on."""
+    """Return means of ``behind`` values before each value and ``ahead`` after it, starting at index ``first``."""
     needed = values[max(first - behind, 0) :]
     width = behind + 1 + ahead
     sums = np.zeros(values.size - first + width)

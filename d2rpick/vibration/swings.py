@@ -306,7 +306,7 @@ class Envelope(NamedTuple):
 
 
 def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
-    """Find the lowest decaying exponential above all peaks, fitted around their middle; None without peaks.
+    """Find the lowest decaying exponential above all peaks, fitted around their middle; None if there are no peaks.
 
     Parameters
     ----------

@@ -126,7 +126,7 @@ class Judged:
     def of(
         cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
     ) -> Judged:
-        """Measure and judge the ``moments`` of each situation; without a vibration no measure is used."""
+        """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure is used."""
         sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
         if len(moments_of_each) == 1:
@@ -265,7 +265,7 @@ class Candidates(Sequence[Candidate]):
     """A lazy sequence of the candidates of one td in a given order; each candidate is built when it is accessed.
 
     ``order`` has the row numbers of the candidates in ``judged``; these are ranked if ``ranked`` is True.
-    ``recommended`` is the position of the recommended candidate in ``order``, None without one.
+    ``recommended`` is the position of the recommended candidate in ``order``, None if there is none.
     """
 
     situation: Situation
@@ -286,12 +286,12 @@ class Candidates(Sequence[Candidate]):
 
     @cached_property
     def chosen(self) -> Candidate | None:
-        """The recommended candidate; None without one."""
+        """The recommended candidate; None if no candidate is recommended."""
         return None if self.recommended is None else self[self.recommended]
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The recommended pair, which is faster to compute than the candidate; None without one."""
+        """The recommended pair, which is faster to compute than the candidate; None if there is none."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.quality import Cause, Quality
     from d2rpick.choice.pair.situation import Situation
 
-# CHOOSE_ANOTHER: cure for a pair that is not admissible.
-# CHECK_SWITCHED_RUN: cure for a recommended pair that a finished switched run contradicts.
+# CHOOSE_ANOTHER: advice if a pair is not admissible.
+# CHECK_SWITCHED_RUN: advice if a finished switched run contradicts the verdict on a recommended pair.
 CHOOSE_ANOTHER: Final = "choose another pair (d2rpick suggest names one)"
 CHECK_SWITCHED_RUN: Final = (
     "check that the switched run was switched at these times and is otherwise identical to the reference run; "
@@ -59,7 +59,7 @@ class Decision(NamedTuple):
     worst_residual : float
         Largest residual that the record allows [-].
     better : Pair or None
-        A better pair, if one was searched and found.
+        A better pair, if one was requested and found.
     cure_of_objections : str
         What to do about the objections if there is no better pair.
     best_of : (float, float) or None

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import History, Samples
 
-# Deformation errors that exceed the smallest error by at most this are treated as equal [-].
+# Deformation errors are treated as equal to the smallest one if they exceed it by at most this value [-].
 EQUALLY_GOOD = 0.02
-# Level errors that differ by at most this are treated as equal [-].
+# Level errors of pairs are treated as equal if they differ by at most this value [-].
 # Smaller differences do not matter, because the level predicts the mean energy after td to 10 % at best.
 LIKE_LEVELS = TOLERATED_GROWTH
 # Largest level error that rounding may cause at a crossing, for levels above this share of the highest energy [-].
@@ -80,8 +80,8 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
     longest, those with a large position error come after the others.  Many modes have another residual at each tr.
-    There, all good pairs are of like quality; without a good pair, all that the band of the best leaves open are.  The
-    rest follows by error.
+    There, all good pairs are of like quality; if there is no good pair, all that the band of the best leaves open are.
+    The rest follows by error.
     """
     late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.situation_of
@@ -162,10 +162,10 @@ def order_by_quality(
 ) -> NDArray[np.intp]:
     """Return the order of the candidates by group; in each group, the equally good best candidates come first.
 
-    These are the good ones.  In a group without any, they are those with an error within ``room``, of shape (groups,),
-    of the smallest, or with an expected error that the band of the best leaves open; the other arguments have shape
-    (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those with
-    ``is_off`` come last, and before these those with an error further than ``room`` from the smallest.  The others
+    These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
+    (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
+    have shape (n,).  They are ordered by descending rigid time; but among rigid times within 10 % of the longest, those
+    with ``is_off`` come last, and before these those with an error further than ``room`` from the smallest.  The others
     follow by error.
     """
     error = np.round(errors.error, _DECIMALS)
@@ -537,7 +537,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def count_states_per_period(energy: Samples) -> float | None:
-    """Return the average number of samples per energy period (two crossings of the mean); None without a period.
+    """Return the average number of samples per energy period (two crossings of the mean); None if there is no period.
 
     Examples
     --------

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 _SOLVER_ERROR: Final = 1e-5
 # A fluctuation below this share of the largest vibration energy after the load is ignored [-].
 _FAINT: Final = 1e-4
-# If an oscillator describes at least this share of the record, no modes are searched for [-].
+# If an oscillator describes at least this share of the record, no modes are fitted [-].
 _MOST_OF_RECORD: Final = 0.5
 # Rounding error in units of the last digit, because a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
@@ -188,7 +188,7 @@ class Situation:
 
     @cached_property
     def margin(self) -> float:
-        """Time kept free before the next contact [time]; 0 for a given td without a given margin or landing."""
+        """Time kept free before the next contact [time]; 0 if the user gives td, but neither margin nor landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
@@ -215,7 +215,7 @@ class Situation:
 
     @cached_property
     def bodies(self) -> Bodies | None:
-        """Drift in flight of the rigid bodies that the parts become; None without part data."""
+        """Drift in flight of the rigid bodies that the parts become; None if there are no part data."""
         return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
@@ -323,7 +323,7 @@ def examine_td(
 
 
 def _choose_time_of_fit(seen: Seen, td: float) -> float:
-    """Return the time around which an oscillator is searched for [time].
+    """Return the time around which an oscillator is fitted to the energy [time].
 
     If nothing flies at td, the oscillator of the nearest flight shows which pairs exist in that flight.
     """
@@ -411,7 +411,7 @@ def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
-    """Return True if a window covers so much of the record that no modes need to be searched for."""
+    """Return True if a window covers so much of the record that no modes need to be fitted."""
     if described is None:
         return False
     record = float(history.time[-1] - history.time[0])
@@ -421,7 +421,7 @@ def _covers_most(history: History, described: Described | None) -> bool:
 def _choose_longer_window(
     by_oscillator: Described | None, modes: ModalWindow | None
 ) -> Described | None:
-    """Return the window of an oscillator, or a longer one that modes describe; None without either.
+    """Return the window of an oscillator, or a longer one that modes describe; None if there is neither.
 
     Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
     modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.

@@ -315,7 +315,7 @@ def describe_end_of_flight(situation: Situation) -> str:
 
 
 def _describe_margin(margin: float | None) -> str:
-    """Describe a margin; empty without one."""
+    """Describe a margin; empty if there is no margin."""
     return f" with the margin {margin:.6g}" if margin else ""
 
 
@@ -356,7 +356,7 @@ class Expectation(NamedTuple):
     kinetic_share : float
         Kinetic fraction of the vibration energy at td, 1 - E(td)/(2 <E>) [-].
     ratio : float or None
-        Mean of E after td, relative to the reference run, if E(tr) is locked in [-]; None without a tr.
+        Mean of E after td, relative to the reference run, if E(tr) is locked in [-]; None if there is no tr.
     ratio_low : float or None
         Ratio if all of E(tr) vibrates, undamped: E(tr)/(2 <E>) [-].
     ratio_at_level : float
@@ -394,7 +394,7 @@ class Means(NamedTuple):
 
 
 def compute_means(situation: Situation) -> Means | None:
-    """Compute the energies of the flight; None if the basis is not "energy", without flight or energy, and at rest."""
+    """Compute the energies of the flight; None if the basis is not "energy", or nothing flies or vibrates."""
     if situation.basis != "energy":
         return None
     mean = compute_mean_in_flight(situation)
@@ -418,9 +418,9 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the motion after td; None if the basis is not "energy", or without a flight or energy.
+    """Estimate the motion after td; None if the basis is not "energy", or if there is no flight or energy.
 
-    ``energy_tr`` is the energy that the recommended tr locks in [energy], None without a tr.
+    ``energy_tr`` is the energy that the recommended tr locks in [energy], None if there is no tr.
     """
     means = compute_means(situation)
     if means is None:

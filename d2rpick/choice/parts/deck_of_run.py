@@ -273,7 +273,7 @@ def add_deck_to_settings(
 
 
 def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:
-    """Return a run with the surroundings that its deck defines; unchanged without a deck of the model."""
+    """Return a run with the surroundings that its deck defines; unchanged if there is no deck of the model."""
     if inventory is None or check_model_of_deck(run, inventory):
         return run
     return run.within(_find_surroundings(inventory))

@@ -28,7 +28,7 @@ _TIMES: Final = 100
 def find_drift_of_bodies(
     history: History, flight: Flight, settings: Settings
 ) -> Bodies | None:
-    """Return the drift of the rigid bodies of the parts in a flight; None without data of parts."""
+    """Return the drift of the rigid bodies of the parts in a flight; None if there are no data of parts."""
     history, flight = restore_parts(history, flight)
     if flight.parts is None:
         return None
@@ -89,7 +89,7 @@ def compute_turning_speed(
     """Return the speed that the rotation of the bodies adds at the points where they touch a contact [length/time].
 
     If the deck gives the places of the parts but nothing shows how the bodies turn, it is the least speed that the
-    kinetic energy allows.  None without a deck, or if the momenta do not show a direction.
+    kinetic energy allows.  None if there is no deck, or if the momenta do not show a direction.
     """
     from d2rpick.flight.turning_bound import bound_turning_speed
 

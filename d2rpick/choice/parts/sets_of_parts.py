@@ -114,7 +114,7 @@ class PartSet(NamedTuple):
 class Parts:
     """The answer of ``parts``: all parts, sets of parts, and warnings.
 
-    ``inventory`` is None without a deck.
+    ``inventory`` is None if there is no deck.
     """
 
     files: OpenedRun
@@ -128,7 +128,7 @@ class Parts:
 
     @property
     def recommended(self) -> PartSet | None:
-        """The recommended set; None without one."""
+        """The recommended set; None if no set is recommended."""
         return next((part_set for part_set in self.sets if part_set.recommended), None)
 
 
@@ -150,7 +150,7 @@ def compare_sets_of_parts(
     settings : Settings
         As for ``suggest``; its cost share is not used.
     model : CostModel or None
-        The deck with its costs; without it the costs and most verdicts stay unknown.
+        The deck with its costs; if it is missing, the costs and most verdicts stay unknown.
     given_ids : sequence of int
         Part ids of a further set to compare.
     times : (float, float) or float, optional
@@ -296,7 +296,7 @@ class _SetComparison:
 
     @cached_property
     def placement(self) -> Placement | None:
-        """Positions of the parts according to the deck; None without a deck."""
+        """Positions of the parts according to the deck; None if there is no deck."""
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:

@@ -76,8 +76,8 @@ class PartFacts(NamedTuple):
 class RunFacts(NamedTuple):
     """Data of all parts from the history.
 
-    ``flights`` are (start, end) [time], ``longest`` is the index of the longest one, None without flights.  ``reason``
-    states why there are no parts or no flights.
+    ``flights`` are (start, end) [time], ``longest`` is the index of the longest one, None if there are no flights.
+    ``reason`` states why there are no parts or no flights.
     """
 
     parts: Mapping[int, PartFacts]
@@ -237,14 +237,14 @@ def judge_parts(
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
-    """Judge every part of a deck or history, ascending by id.
+    """Judge whether each part of a deck or history can be switched; the rows ascend by part id.
 
     Parameters
     ----------
     facts : RunFacts
         Data from the history.
     model : CostModel or None
-        The deck with its costs; without it no verdict that depends on materials or shared nodes is given.
+        The deck with its costs; if it is missing, no verdict that depends on materials or shared nodes is given.
     printed : mapping of (float, str), optional
         Smallest time steps of the parts that controlled the time step, by id, with the name of the source [time].
     """
@@ -408,7 +408,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
 def _list_unknowns(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
-    """Yield the missing data without which a part cannot be judged, although nothing speaks against switching it."""
+    """Yield the missing data that a verdict on a part needs, if nothing speaks against switching the part."""
     if inventory is None:
         yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:

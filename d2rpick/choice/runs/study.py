@@ -162,7 +162,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyOfRuns:
-    """The answer of ``study``; ``agree`` is True if the intervals of tr intersect, None without any tr.
+    """The answer of ``study``; ``agree`` is True if the intervals of tr intersect, None if there is no tr.
 
     ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
     """
@@ -305,7 +305,7 @@ def make_failed_row(source: str, error: BaseException) -> StudyRow:
 
 
 def stamp_files(source: str) -> tuple[Stamp, ...]:
-    """Return the current size and modification time of each file of a run, by absolute name; empty without files."""
+    """Return size and modification time of each file of a run, by absolute name; empty if there are no files."""
     try:
         states = [
             (os.path.realpath(name), Path(name).stat()) for name in expand([source])
@@ -393,7 +393,7 @@ def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
 
 
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
-    """Yield warnings about repeated and omitted runs and runs of different kinds, and the warnings of single runs."""
+    """Yield the warnings of single runs, and warnings about repeated, omitted and dissimilar runs."""
     repeated = find_repeated_runs(rows)
     if repeated:
         names = list_names([row.source for group in repeated for row in group], NAMED)

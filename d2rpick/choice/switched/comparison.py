@@ -37,7 +37,7 @@ _REPORTED_OFF = 0.01
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
-# Number of times between two states at which the switch to rigid is searched for.
+# The search for the switch to rigid tries this number of times between two states.
 _BETWEEN: Final = 101
 
 
@@ -150,7 +150,7 @@ def compare_runs(
     tolerance : float
         Largest error of the locked-in amplitude [-].
     momenta, centres : pair of Track or None
-        Of the reference run and of the switched run, None for a run without them.
+        Of the reference run and of the switched run; None if a run has no such data.
     is_reported : bool
         True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
@@ -225,7 +225,7 @@ def _select_energies_after(
     if energies_after[0] == energy_rigid and _is_reported_wrong(
         energy_rigid, energies_to_end[1:]
     ):
-        # The solver switches at the first step from td on, so the parts were still rigid in this state.
+        # The solver switches at the first step at or after td, so the parts were still rigid in this state.
         energies_after = energies_after[1:]
         energies_to_end = energies_to_end[1:]
     is_wrong = _is_reported_wrong(energy_rigid, energies_to_end)
@@ -273,7 +273,7 @@ def _compute_energy_range(history: History, start: float, end: float) -> float:
 def _find_rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
-    """Return the first and last state of constant energy around the middle of (tr, td) [time]; None without one."""
+    """Return the first and last state of constant energy around the middle of (tr, td); None if there is none."""
     time = switched.time
     energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
@@ -401,7 +401,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
 def _explain_why_no_times(
     switched: History, reference: History, spans: Sequence[tuple[int, int]]
 ) -> str:
-    """Explain why no rigid window is found; ``spans`` has the first and last states of each constant energy."""
+    """Explain why no rigid window is found; ``spans`` are the first and last states of times with constant energy."""
     if np.array_equal(switched.time, reference.time) and np.array_equal(
         switched.energy, reference.energy
     ):
@@ -440,7 +440,7 @@ def _compute_distance(
 ) -> float | None:
     """Return the largest distance of the second track from the first between two times; None if one is missing.
 
-    The first state from td on is left out, since it may still be rigid.
+    The first state at or after td is left out, since the parts may still be rigid in that state.
     """
     if reference is None or switched is None:
         return None

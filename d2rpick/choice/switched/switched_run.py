@@ -480,7 +480,7 @@ def _find_misreported(
     """Return the parts whose energies after td and at tr differ by more than is possible."""
     time = switched.part_time
     energies = switched.part_energies(parts)
-    # In the first state from td on the parts may still be rigid.
+    # In the first state at or after td, the parts may still be rigid.
     first = int(np.searchsorted(time, pair[1])) + 1
     last = int(np.searchsorted(time, pair[0], side="right")) - 1
     if last < 0 or first >= time.size:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
-# A vibration without contacts is searched for at these times, as shares of the record [-].
+# The search for a contact-free vibration starts at these times, given as shares of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 # Shorter rigid windows, as a share of the record, are left out [-] because they save less than a restart costs.
 MIN_RIGID: Final = 0.05
@@ -160,7 +160,7 @@ def _insert_flight(
 
 
 def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
-    """Return the last flight that starts before a landing [time]; None without one."""
+    """Return the last flight that starts before a landing [time]; None if there is no such flight."""
     return max(
         (flight for flight in flights if (flight.start or 0.0) < landing),
         key=lambda flight: flight.start or 0.0,

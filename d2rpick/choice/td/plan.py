@@ -79,32 +79,32 @@ class PlannedFlight(NamedTuple):
 
     @property
     def rigid_time(self) -> float | None:
-        """Length of the window [time]; None without one."""
+        """Length of the window [time]; None if there is no window."""
         return self.window[1] - self.window[0] if self.window else None
 
     @property
     def rigid_fraction(self) -> float | None:
-        """Share of the record in which the parts are rigid because of this window [-]; None without a window."""
+        """Share of the record in which the parts are rigid because of this window [-]; None if there is no window."""
         return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
     def candidate(self) -> Candidate | None:
-        """The recommended tr with its measures; None without a window."""
+        """The recommended tr with its measures; None if there is no window."""
         return self.answer.chosen if self.answer and self.window else None
 
     @property
     def decision(self) -> Decision | None:
-        """Verdict on the pair as in ``suggest``; None without a pair, or if the window is done."""
+        """Verdict on the pair as in ``suggest``; None if there is no pair, or if the window is done."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the pair as in ``suggest``; None without a window, or if the window is done."""
+        """Grade of the pair as in ``suggest``; None if there is no window, or if the window is done."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
     def locks_in(self) -> bool | None:
-        """True if the window locks in energy, so that later landings move; None without a window.
+        """True if the window locks in energy, so that later landings move; None if there is no window.
 
         It locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
         """
@@ -170,7 +170,7 @@ class RunPlan:
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the supported windows, relative to the reference [-]; None without a cost share."""
+        """Expected run time with the windows, relative to the reference run [-]; None if the cost share is unknown."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -285,7 +285,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Complete a row with the suggestion for its flight, which starts after the previous landing.
+    """Complete a row of the plan with the window suggested for its flight, which starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.

@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# The best td are searched for at this many of the most promising energy peaks, and at as many of the last peaks.
+# The search for the best td tries this number of the most promising energy peaks, and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# For many modes, the smallest residual is searched for among windows at least this long, relative to the longest [-].
+# For many modes, only windows of at least this length, relative to the longest window, are compared [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 # Good windows are treated as equally long if they have at least this share of the length of the longest [-].
 _LONG: Final = 0.9
@@ -151,7 +151,7 @@ def choose_td(
     Raises
     ------
     RangeError
-        If the window lies outside the record, or without one nothing in it shows a flight.
+        If the window lies outside the record, or if no window is given and nothing shows a flight.
     """
     if window is None:
         window = find_longest_flight(history, settings)
@@ -208,7 +208,7 @@ def list_offered_times(
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
-    """Return the error by which pairs are compared across td [-]; None without a pair or if its level is too high.
+    """Return the error by which pairs are compared across td [-]; None if there is no pair or if its level is too high.
 
     A level is too high if it exceeds the largest possible vibration energy.
     """
@@ -238,8 +238,8 @@ def _find_unbeaten(
 
     Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
     flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
-    be compared with the pair at td, no oscillator is searched at a td that loses without one.  No pair is rigid before
-    ``earliest`` [time].
+    be compared with the pair at td, no oscillator is fitted at a td that is worse even if the oscillator is ignored.
+    No pair is rigid before ``earliest`` [time].
     """
     choice = next(iter(_select_acceptable([look(td)])), None)
     if choice is None:
@@ -345,7 +345,7 @@ def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in a window without vibration.
+    """Return the last td in a window in which nothing vibrates.
 
     It lies before the last state, and before the contact by the time that the contact may move.
     """
@@ -581,10 +581,10 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, or the last of several equal ones; None without choices."""
+    """Return the choice with the longest rigid time, or the last of several equal ones; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 
 def _get_td(pair: Choice | None) -> float | None:
-    """Return the td of a choice; None without a choice."""
+    """Return the td of a chosen pair; None if no pair was chosen."""
     return pair[0].td if pair else None

@@ -87,17 +87,17 @@ class Offer(AnswerAtTd):
 
     @property
     def tr(self) -> float | None:
-        """Recommended tr [time]; None without one."""
+        """Recommended tr [time]; None if no tr is recommended."""
         return self.pair.tr if self.pair else None
 
     @property
     def rigid_time(self) -> float | None:
-        """Time for which the parts are rigid [time]; None without a pair."""
+        """Time for which the parts are rigid [time]; None if there is no pair."""
         return self.pair.rigid_time if self.pair else None
 
     @property
     def best(self) -> Candidate | None:
-        """The recommended candidate; None without one."""
+        """The recommended candidate; None if no candidate is recommended."""
         return self.candidates.chosen
 
     @property
@@ -332,7 +332,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     """Return the nearest offer with half the error, else the recommended offer if it is better, else None.
 
-    Like ``suggest``, it looks at the energy peaks first; without one it takes a Pareto-optimal offer.
+    Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """
     error = np.inf if start.error is None else start.error
     least_time = _LEAST_KEPT * (start.rigid_time or 0.0)
@@ -383,7 +383,7 @@ def _warn_about_window(
 
 
 def _explain_by_limits(suggestion: PairSuggestion) -> str:
-    """Describe which limits the nearest candidate exceeds at the td that ``suggest`` chooses; empty without any."""
+    """Describe the limits that the nearest candidate exceeds at the td of ``suggest``; empty if there are none."""
     if suggestion.recommended or not suggestion.candidates:
         return ""
     nearest = suggestion.candidates[0]

@@ -120,7 +120,7 @@ def make_head(title: str, database: str) -> str:
 
 
 class Stretch(NamedTuple):
-    """``repeats`` equal blocks of ``stride`` bytes, from ``start`` on, with the layout of the block at ``example``."""
+    """A sequence of ``repeats`` blocks of ``stride`` bytes from ``start``, laid out like the one at ``example``."""
 
     start: int
     stride: int
@@ -132,14 +132,14 @@ def count_like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
-    """Count the blocks of ``run`` whose fixed bytes, from ``offset`` on, equal those of its example.
+    """Count the blocks of ``run`` whose fixed bytes, starting at ``offset``, equal those of its example.
 
     Parameters
     ----------
     data : Content
     run : Stretch
     offset : int
-        Byte of the blocks from which on they are compared.
+        Byte of the blocks at which the comparison starts.
     literal : array of shape (size,)
         255 for the bytes that must be those of the example, 0 for the others.
     varied : array of shape (size,), optional

@@ -299,7 +299,7 @@ def _read_t_his(text: _CurveText) -> bool:
 
 
 def _remove_type(line: str) -> str:
-    """Return a label without its type and factor.
+    """Remove the type and the factor, as in ``<TIME/0.001>``, from a label.
 
     Examples
     --------

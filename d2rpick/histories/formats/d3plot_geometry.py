@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _WITH_MATERIAL_TYPES: Final = (5, 7)
 _WITH_ROADS: Final = (6, 7, 9)
 WITH_RIGID_BODIES: Final = (8, 9)
-# Words per element of each kind in the sections of additional nodes.
+# Number of words that the sections of additional nodes contain for each element, by element type.
 _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}

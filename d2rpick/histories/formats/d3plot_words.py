@@ -142,7 +142,7 @@ class Words:
         return FormatError(f"{self.source}: it has {content}; {cure}")
 
     def bytes(self, at: int, size: int) -> bytes:
-        """Return ``size`` bytes from byte ``at`` on; raise FormatError if the file is shorter."""
+        """Return ``size`` bytes that start at byte ``at``; raise FormatError if the file ends before."""
         if at < 0 or size < 0 or not self.has(at, size):
             problem = f"{self.source}: the file has {len(self._content)} bytes, its head goes on beyond them"
             raise FormatError(f"{problem}; it is cut or damaged, copy it again")

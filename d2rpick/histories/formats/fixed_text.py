@@ -68,7 +68,7 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # Smallest number of equal blocks for which the differing bytes are stored, so that this needs little memory.
+    # Positions of differing bytes are stored only for at least this number of equal blocks, to save memory.
     many = 64
     # number of numbers converted at once, which fit into the processor's cache
     batch = 1 << 14
@@ -325,7 +325,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` with a recent layout; None without one."""
+        """Return example, stride and count of the blocks at ``position`` if their layout is a recent one; else None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -365,7 +365,7 @@ class Blocks(Database):
         return next(alike, last.start)
 
     def _count(self, position: int, example: int, stride: int) -> int:
-        """Count the blocks from ``position`` on that resemble the example and are followed by another block."""
+        """Count the blocks that start at ``position``, resemble the example, and are followed by another block."""
         literal = self.layout(example, stride).literal
         start = self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Line with a part of the internal energy; it is read in advance, because it is always used.
+# Label of the energy of springs, a part of the internal energy that is always needed and thus read in advance.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
 _NEAR: Final = 4096  # number of bytes at the start of a file that contain the header and the first state

@@ -273,7 +273,7 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    # Path of the variable without the zone.
+    # Path of the variable; the name of the zone, such as ZONE1, is removed.
     variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable

@@ -1,7 +1,7 @@
 """Read HDF5 files: time and energy columns of any layout, and binouts saved by lasso-python.
 
 A file with the branches of a binout is treated as a saved binout. Of any other file, columns are chosen by their
-paths; without a choice, the only column that fits is used, and if several fit the message lists them.
+paths; if the user chooses no column, the only column that fits is used, and if several fit the message lists them.
 """
 
 from __future__ import annotations

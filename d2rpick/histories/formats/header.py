@@ -36,12 +36,12 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-# Number of columns used if another program wrote more names than columns: the time and the first value.
+# Number of columns used, time and first value, if another program wrote more names than columns.
 _SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Names and units of the columns, as far as the file has them; only the first ``sure`` names are certain."""
+    """Names and units of the columns, if the file contains them; only the first ``sure`` names are certain."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()

@@ -360,7 +360,7 @@ class Lsda:
     def _skip(self, previous: int | None, position: int) -> int:
         """Return the bytes to skip if the records from ``previous`` to ``position`` repeat; store the skipped states.
 
-        The last repetition is left to the walk, which then goes on as usual.
+        The last repetition is left to the walk, which then reads the following records one by one.
         """
         if previous is None or not self._alike(previous, position):
             return 0

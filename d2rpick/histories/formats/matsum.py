@@ -67,7 +67,7 @@ _LINE: Final = re.compile(
     re.MULTILINE,
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
-# A part number has 5 columns, or 8 columns from 100000 on; a longer number shifts the rest of the line.
+# A part number has 5 columns, or 8 columns if it is at least 100000; a longer number shifts the rest of the line.
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
@@ -282,7 +282,7 @@ def _describe_matsum_block(
 
 
 def _find_part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
-    """Return the number of the part whose first line continues with ``text``.
+    """Read the part number from ``text``, which begins with the number.
 
     A single overflowed number is the only number of the legend that is too wide; several could not be told apart.
     """

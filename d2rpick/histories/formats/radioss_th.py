@@ -46,7 +46,7 @@ _TITLES: Final = (
     100,
 )
 
-# Global variables in the order of the file: the first 12 up to 2024, 16 in 2025, 22 from 2026 on.
+# Global variables in the order of the file: the first 12 up to version 2024, 16 in version 2025, 22 since version 2026.
 _GLOBALS: Final = (
     "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum", "mass", "time_step",
     "rotation_energy", "external_work", "spring_energy", "contact_energy", "hourglass_energy",

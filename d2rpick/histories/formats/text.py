@@ -61,7 +61,7 @@ class Text:
 
     @property
     def head(self) -> list[str]:
-        """The first lines that have a line end, from which the layout of the text is determined."""
+        """The first complete lines; the layout of the text is determined from them."""
         return self._first[: self.top]
 
     @property
@@ -81,7 +81,7 @@ class Text:
         return address
 
     def take_rest(self) -> None:
-        """Treat the unterminated last line as a complete line from now on."""
+        """Mark the unterminated last line as a complete line."""
         self._end = len(self._data)
 
     @property
@@ -106,7 +106,7 @@ class Text:
         self._data.check()
 
     def lines(self, begin: int) -> Iterator[str]:
-        """Yield the lines from byte ``begin`` on, without their ends."""
+        """Yield the lines that start at or after byte ``begin``, without their line ends."""
         for piece in self.pieces(begin):
             yield from self.rows(piece)
 
