@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Name of the Radioss output that contains part momenta.
+# Radioss output that contains part momenta
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
@@ -85,8 +85,8 @@ class Overview(NamedTuple):
     source: ``plan`` and ``suggest`` choose from them; they rest on the energy alone if nothing better is written.
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
-    show the flights for certain; None if it is written, or there is no state.  ``deck`` is
-    the main deck of the run that was used, and ``selection`` the columns and parts that the user chose.
+    show the flights for certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run
+    that was used, and ``selection`` the columns and parts that the user chose.
     """
 
     source: tuple[str, ...]
@@ -262,7 +262,7 @@ def _list_notes(
 
 
 def _measure_sampling(time: Samples) -> Sampling | None:
-    """Return the output intervals between the states; None if there are fewer than two states."""
+    """Return the output intervals between the states; None for fewer than two states."""
     steps = np.diff(time)
     if not steps.size:
         return None
@@ -383,7 +383,7 @@ def _assess_health_of_run(
 
 
 def _read_history(run: OpenedRun, selection: Selection) -> History | None:
-    """Return the history to be judged; None if the user has to choose an energy, or if there are no states."""
+    """Return the history to be judged; None if the user has to choose an energy, or there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):

@@ -391,7 +391,7 @@ class History:
         return f"; in the same folder are {', '.join(legs)}, later restart segments of the run? Name them too"
 
     def check(self, *times: float, argument: str = "", subject: str = "") -> None:
-        """Raise RangeError unless all times are in the record.
+        """Raise RangeError if a time lies outside the record.
 
         The message names the ``argument`` that the user gave, or else describes the times as the ``subject``.
         """
