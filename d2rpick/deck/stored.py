@@ -137,7 +137,9 @@ def _open_file(name: str) -> FileIO:
             f"{name}: no such file; check the name and the folder"
         ) from None
     except IsADirectoryError:
-        raise DeckError(f"{name}: this is a folder; give the main deck in it") from None
+        raise DeckError(
+            f"{name}: cannot be read (this is a folder); check the name, and give the main deck in it"
+        ) from None
     except (OSError, ValueError) as error:
         # ValueError is raised for a NUL byte in the name.
         reason = getattr(error, "strerror", None) or error
