@@ -281,7 +281,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
         f"tr = {longer.tr:.6g}, td = {longer.td:.6g}, rigid for {longer.rigid_time:.6g}"
     )
     shorter = (
-        f"the recommended window is {lost:.6g} ({lost / longer.rigid_time:.0%}) shorter"
+        f"the recommended window is {lost:.3g} ({lost / longer.rigid_time:.0%}) shorter"
     )
     return f"a longer window exists ({times}), but it has {better_quality}; {shorter}"
 
