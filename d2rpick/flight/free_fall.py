@@ -56,7 +56,7 @@ _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
 # _FADED: a force fades if in the last third of a window it has at most this share of its size in the first third [-].
 # _LITTLE: at the end of a window a fading force is at most this share of the weight [-].
 _FADED, _LITTLE = 0.6, 0.02
-# A motion is straight if the momentum at right angles to it is at most this share of the momentum [-].
+# A motion is straight if the momentum perpendicular to its direction is at most this share of the momentum [-].
 _STRAIGHT = 0.01
 # A change of momentum is treated as zero if it is at most this many times the fitting error [-].
 _UNSEEN = 2.0

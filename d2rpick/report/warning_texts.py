@@ -86,8 +86,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if the verdict is clear. Otherwise choose a td near a peak of the internal energy.",
         ),
         "no-better-td": Explanation(
-            "No peak of the energy in this flight has an admissible tr: a tr in the flight, with the same direction as "
-            "at td and a small enough error. So d2rpick offers no other td.",
+            "No peak of the energy in this flight has an admissible tr. A tr is admissible if it lies in the flight, "
+            "the deformation has the same direction as at td, and the error is small enough. So d2rpick offers no "
+            "other td.",
             "Compare other values of td with d2rpick explore, or choose other parts.",
         ),
         "no-candidate": Explanation(

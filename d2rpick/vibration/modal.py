@@ -560,7 +560,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
-    """Return the correlation of neighbouring misfits, at least 0: their share that is not white noise."""
+    """Return the correlation between the misfits of neighbouring states, at least 0; white noise gives 0 [-]."""
     products = np.sum(remainder[1:] * remainder[:-1])
     power = max(float(np.sum(remainder**2)), 1e-300)
     return float(np.clip(products / power, 0.0, 1.0))

@@ -211,7 +211,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
     """Explain why a pair is good: its vibration is preserved, or the error of the vibration hardly matters."""
     if quality.alone.grade == GOOD:
-        error = "" if residual is None else f" to within {residual:.1%}"
+        error = "" if residual is None else f" with an error of {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
     return f"{'; '.join(quality.alone.reasons)}{_explain_raised_grade(quality)}"
 

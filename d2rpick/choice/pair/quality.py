@@ -443,13 +443,13 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
     if share is None or share <= POOR_KINETIC_SHARE:
         return Cause(
             reason,
-            "see with d2rpick explore whether another tr or td is better",
+            "use d2rpick explore to see whether another tr or td is better",
             needs_other_times=True,
             kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}",
         )
     return Cause(
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
-        "see with d2rpick explore whether another td is better",
+        "use d2rpick explore to see whether another td is better",
         needs_other_times=True,
         kind="most of the vibration energy is kinetic at td, which no tr can keep",
     )
@@ -511,7 +511,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
         causes.append(
             Cause(
                 f"the vibration after td is wrong by {best.residual:.0%}{worst_text}",
-                "see with d2rpick explore whether another td is better",
+                "use d2rpick explore to see whether another td is better",
                 needs_other_times=True,
                 kind=f"{_WRONG_BY_MORE} {MOST_GOOD:.0%}",
             )
