@@ -207,13 +207,14 @@ class Laws:
         ):
             return
         slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
-        for axis, is_seen in zip(np.eye(along.size), across, strict=True):
-            if is_seen @ is_seen > _SEEN**2:
-                size = float(slope @ is_seen) / float(is_seen @ is_seen)
-                if np.linalg.norm(slope - size * is_seen) <= _ALIKE * abs(
-                    size
-                ) and self._is_gravity(abs(size) / self.mass):
-                    yield size * axis
+        for axis, seen_part in zip(np.eye(along.size), across, strict=True):
+            if seen_part @ seen_part <= _SEEN**2:
+                continue
+            size = float(slope @ seen_part) / float(seen_part @ seen_part)
+            left_over = np.linalg.norm(slope - size * seen_part)
+            is_along_axis = left_over <= _ALIKE * abs(size)
+            if is_along_axis and self._is_gravity(abs(size) / self.mass):
+                yield size * axis
 
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
         """Yield the usual weights (3,) that are close to the mean force between two states."""
@@ -238,11 +239,10 @@ class Laws:
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
-        remaining_force = (
-            np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis]
-            - weight
-        )
-        first, _, last = np.linalg.norm(remaining_force, axis=1)
+        # Mean force in each third of the window.
+        steps = np.diff(time)[:, np.newaxis]
+        force = np.diff(self.fit.momentum[at], axis=0) / steps
+        first, _, last = np.linalg.norm(force - weight, axis=1)
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
@@ -444,9 +444,8 @@ class FreeFall(Law):
         super().__init__(time)
         self.momentum = momentum
         self.integral = integrate_by_trapezia(time, momentum)
-        self._both = np.asfortranarray(
-            np.hstack([momentum, self.integral])
-        )  # Columns that are contiguous in memory are faster.
+        # Columns that are contiguous in memory are faster.
+        self._both = np.asfortranarray(np.hstack([momentum, self.integral]))
 
     def _misfit(self, first: int, last: int) -> float:
         if (

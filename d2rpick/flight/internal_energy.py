@@ -393,7 +393,9 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
     first_half, second_half = np.array_split(energy, 2)
     taken = 0.0 if np.isinf(lost[0]) else float(lost[0] - lost[-1])
     drift = float(second_half.mean() - first_half.mean())
-    if abs(drift) > _DRIFT * _ALIKE * width + (taken if drift < 0 else 0.0):
+    # What is taken from the energy explains a fall, but no rise.
+    explained = taken if drift < 0 else 0.0
+    if abs(drift) > _DRIFT * _ALIKE * width + explained:
         return False
     if min(np.ptp(first_half), np.ptp(second_half)) < _ALIKE * width - taken:
         return False

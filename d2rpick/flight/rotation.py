@@ -231,12 +231,12 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
-    across = np.array(
-        [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    )  # The product ``across @ v`` is the cross product of the axis and v.
-    return np.asarray(
-        np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
-    )
+    # The product ``across @ v`` is the cross product of the axis and v.
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Rodrigues' formula.
+    odd = np.sin(angle) * across
+    even = (1 - np.cos(angle)) * (across @ across)
+    return np.asarray(np.eye(3) + odd + even)
 
 
 def find_moving_parts(

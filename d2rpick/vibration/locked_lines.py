@@ -189,11 +189,16 @@ def measure_third_harmonic(
     course = np.exp(third_pole * (time - middle))
     in_rest = 2 * (course.conj() @ spectrum.rest) / np.sum(np.abs(course) ** 2)
     third = np.sum(heights[is_third]) + in_rest
+    height = float(abs(first))
+    # The third harmonic of a spring has three times the phase of the first one.
+    turned_back = third * (first.conj() / abs(first)) ** 3
+    # A line that decays is seen for a part of the window only.
+    widening = float(np.exp(max(-third_pole.real, 0.0) * span / 2))
     return ThirdHarmonic(
-        second / float(abs(first)),
-        _THIRD_OF_SPRING * second**2 / float(abs(first)),
-        float((third * (first.conj() / abs(first)) ** 3).real),
-        scatter * float(np.exp(max(-third_pole.real, 0.0) * span / 2)),
+        second / height,
+        _THIRD_OF_SPRING * second**2 / height,
+        float(turned_back.real),
+        scatter * widening,
     )
 
 

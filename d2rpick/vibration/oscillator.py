@@ -235,10 +235,12 @@ class Oscillator:
             decay = np.exp(-self.alpha / 2 * t)
             return decay * np.cos(omega * t), decay * t * np.sinc(omega * t / np.pi)
         kappa = np.sqrt(-square)
-        slow = np.exp(-(self.omega_0**2) / (self.alpha / 2 + kappa) * t)
-        return slow * (1 + np.exp(-2 * kappa * t)) / 2, slow * -np.expm1(
-            -2 * kappa * t
-        ) / (2 * kappa)
+        slow_rate = self.omega_0**2 / (self.alpha / 2 + kappa)
+        slow = np.exp(-slow_rate * t)
+        # The faster exponential relative to the slower one, and 1 minus this ratio.
+        ratio = np.exp(-2 * kappa * t)
+        difference = -np.expm1(-2 * kappa * t)
+        return slow * (1 + ratio) / 2, slow * difference / (2 * kappa)
 
 
 def _compute_path(alpha: float, t: Values) -> Values:
