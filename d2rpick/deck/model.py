@@ -270,6 +270,15 @@ class Inventory:
     boundary: Boundary = NO_BOUNDARY
     left_rigid: LeftRigid | None = None
 
+    @property
+    def rigid_parts(self) -> set[int]:
+        """Ids of the parts whose material is rigid from the start."""
+        return {
+            part
+            for part, data in self.parts.items()
+            if data.material and data.material.kind == "rigid"
+        }
+
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
         """Return the number of elements by part and kind."""

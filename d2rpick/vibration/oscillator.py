@@ -90,8 +90,13 @@ class Oscillator:
         >>> Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50).omega_2
         249.864613022...
         """
-        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        square = self._squared_damped_rate
         return float(np.sqrt(square)) if square >= 0 else float("nan")
+
+    @property
+    def _squared_damped_rate(self) -> float:
+        """omega_2**2 [1/time^2], negative if overdamped; a difference of squares would lose digits or overflow."""
+        return (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
         """Return the state after ``elapsed`` of free motion from ``start``, equations (7) and (18) of the paper.
@@ -229,7 +234,7 @@ class Oscillator:
         If overdamped, it is the sum of two decaying exponentials.  The slower rate alpha/2 - kappa is computed
         from the product of the rates, omega_0^2, because the difference would lose all digits.
         """
-        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        square = self._squared_damped_rate
         if square >= 0:
             omega = np.sqrt(square)
             decay = np.exp(-self.alpha / 2 * t)

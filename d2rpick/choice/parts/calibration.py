@@ -386,11 +386,7 @@ def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
     """Return the average numbers of deformable elements and further points by class, and of rigid-body nodes."""
-    always = {
-        part
-        for part, data in inventory.parts.items()
-        if data.material and data.material.kind == "rigid"
-    }
+    always = inventory.rigid_parts
     computed: dict[str, float] = {}
     _add_counts(
         computed,

@@ -22,7 +22,7 @@ from d2rpick.choice.pair.quality import (
 from d2rpick.choice.pair.situation import Situation, make_look
 from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
 from d2rpick.choice.td.flights import MIN_RIGID, find_longest_flight
-from d2rpick.flight.flight import SOURCES
+from d2rpick.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
@@ -380,11 +380,9 @@ def _rate_certainty(
     low, high = window
     start, end = situation.flight.within(situation.history.time)
     only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
-    return (
-        not situation.in_flight,
-        SOURCES.index(situation.flight.source),
-        only_ends_in_it,
-    )
+    source = situation.flight.source
+    rank = len(SOURCES) if source is None else SOURCES.index(source)
+    return not situation.in_flight, rank, only_ends_in_it
 
 
 def _choose_by_residual(
