@@ -155,7 +155,7 @@ def suggest_without_unit(value: object) -> str:
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
-    """Explain how to write a share, or a time, that is given in percent; empty for other strings.
+    """Explain how to write a fraction, or a time, that is given in percent; empty for other strings.
 
     Examples
     --------

@@ -202,7 +202,7 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the saved share of the CPU time of the run; None if it is unknown.
+    """Return the saved fraction of the CPU time of the run; None if it is unknown.
 
     A run without switching is assumed to cost the mean of the deformable segments throughout.
     """

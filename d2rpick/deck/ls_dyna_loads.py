@@ -87,7 +87,7 @@ _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
 # Values of DOF that add a second line to a prescribed motion.
 _OWN_CENTRE: Final = (9, 10, 11)
 _RELATIVE: Final = 4  # Value of VAD that adds a second line to a prescribed motion.
-# A node lies on the plane of a *CONSTRAINED_GLOBAL if its distance is below this share of the model size [-].
+# A node lies on the plane of a *CONSTRAINED_GLOBAL if its distance is below this fraction of the model size [-].
 _FLAT: Final = 1e-4
 
 

@@ -43,9 +43,9 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# A node lies on a plane if its distance is below this share of the size of the piece [-].
+# A node lies on a plane if its distance is below this fraction of the size of the piece [-].
 _FLAT: Final = 1e-6
-# A piece moves other pieces on springs only if it has at least this share of the mass of all these pieces [-].
+# A piece moves other pieces on springs only if it has at least this fraction of the mass of all these pieces [-].
 _HEAVY: Final = 0.05
 
 

@@ -54,12 +54,12 @@ _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 # Normalised names of the spring energy in Radioss, in LS-DYNA's glstat, and in the glstat branch of a binout.
 # In tables, the names of spring energies may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Largest spring energy that is treated as zero, as a share of the peak internal energy.
+# Largest spring energy that is treated as zero, as a fraction of the peak internal energy.
 # The limit corresponds to the six to seven digits of a glstat and of single precision.
 _NONE: Final = 1e-6
 # Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
-# Tolerance of the sum of the spring energies of parts, as a share of the peak; matsum prints five digits.
+# Tolerance of the sum of the spring energies of parts, as a fraction of the peak; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
 # Smallest fitted factor with which the energy of a part belongs to a sum; ideal factors are 0 and 1.
 _HALF: Final = 0.5

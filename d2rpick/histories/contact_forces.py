@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Forces, and changes of an impulse, below this share of the largest value are treated as zero [-].
+# Forces, and changes of an impulse, below this fraction of the largest value are treated as zero [-].
 # Single precision has seven digits, so smaller values are rounding errors.
 _NOTHING: Final = 1e-6
 

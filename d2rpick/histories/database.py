@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest share of the states at which a time may step back. Other columns step back more often than a restart.
+# Largest fraction of the states at which a time may step back. Other columns step back more often than a restart.
 _MOST_BACK: Final = 0.1
 # Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
@@ -45,7 +45,7 @@ DIGITS: Final = {4: 7, 8: 17}
 _LONG = 30.0
 # Number of states whose time steps are compared at once, so that they fit into the processor's cache.
 _PIECE: Final = 1 << 15
-# Smallest share of the times of the coarser database that the other database of the same run also has.
+# Smallest fraction of the times of the coarser database that the other database of the same run also has.
 # A solver writes all databases of a run at its own cycles, even if their output intervals differ.
 _FEWEST = 0.5
 # Largest difference of the end times of databases of one run [output intervals]; a killed run lacks some states.

@@ -31,9 +31,9 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# A time converted to ms or us must lie beyond this first share of the record to be plausible.
+# A time converted to ms or us must lie beyond this first fraction of the record to be plausible.
 _NEVER_MEANT: Final = 0.01
-# A time converted to a smaller unit must lie beyond this first share of the record to be suggested.
+# A time converted to a smaller unit must lie beyond this first fraction of the record to be suggested.
 _HARDLY_MEANT: Final = 0.05
 # A td among this number of first states is assumed to have another unit, because it would hardly save time.
 # A td and 1000 times this td both lie in the record only if the record has 1000 states or more.

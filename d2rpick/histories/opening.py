@@ -48,7 +48,7 @@ _MOST_TABLES: Final = 3
 # Characters at the end of the name of a later file of a family.
 _DIGITS: Final = "0123456789"
 
-# Largest difference of energies at a common time of two restart segments, as a share of the largest energy.
+# Largest difference of energies at a common time of two restart segments, as a fraction of the largest energy.
 _SAME = 0.01
 # Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Smallest share of states that repeat the previous time in a table with a row for each part.
+# Smallest fraction of states that repeat the previous time in a table with a row for each part.
 _REPEATED: Final = 0.49
 # Smallest number of times that is examined; equal times of fewer rows may be a coincidence.
 FEWEST_TIMES: Final = 3
@@ -24,7 +24,7 @@ FEWEST_TIMES: Final = 3
 _ALIKE = 2.0
 # Number of adjacent windows that are combined into one window of the next level of the search table.
 _TOGETHER: Final = 8
-# A root has converged if it moves by less than this share of its time, which is about the rounding error.
+# A root has converged if it moves by less than this fraction of its time, which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
 HALVINGS: Final = 50  # number of bisections that narrow a bracket to the rounding error
 

@@ -46,7 +46,7 @@ SAME_CONTACT = 2e-3
 
 # Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars that touch nothing.
 _SAFETY = 0.9
-# A time that exceeds a whole number of time steps by less than this share of a step is rounded down [-].
+# A time that exceeds a whole number of time steps by less than this fraction of a step is rounded down [-].
 _SAME = 1e-6
 
 

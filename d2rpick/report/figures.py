@@ -40,7 +40,7 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
 NEUTRAL: Final = "#595959"
 # Width of a figure in a file [inch].
 WIDTH: Final = 10.0
-# Largest width of the label of a switch time, as a share of the axes; True stands for a page, False for a file.
+# Largest width of the label of a switch time, as a fraction of the axes; True stands for a page, False for a file.
 LABEL: Final = {False: 0.14, True: 0.28}
 # If the largest value is at least this many times the smallest, a logarithmic axis has marks only at powers of ten.
 _DECADES: Final = 100.0
@@ -96,7 +96,7 @@ def note(
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
-    """Write a string at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
+    """Write a string at ``place`` (time, height as a fraction of the axes), moved by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
     axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 

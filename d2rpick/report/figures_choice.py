@@ -61,11 +61,11 @@ _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
 # Largest number of candidates drawn as marks; more are drawn as a band of admissible tr.
 _FEW: Final = 20
-# Height of the band at the bottom of the axes, as a share of the axes. The curve lies above the band.
+# Height of the band at the bottom of the axes, as a fraction of the axes. The curve lies above the band.
 _BAND: Final = 0.045
-# Time shown before and after the flights of a plan, as a share of their span.
+# Time shown before and after the flights of a plan, as a fraction of their span.
 _BEYOND_FLIGHTS: Final = 0.05
-# The label of a window contains its times if the window is at least this share of the simulated time.
+# The label of a window contains its times if the window is at least this fraction of the simulated time.
 _ROOM_FOR_TIMES: Final = 0.2
 
 # Colours of the windows in a plan, by verdict or state.
@@ -86,7 +86,7 @@ _HATCHES: Final = {
 # _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
 # _PLAN_PANEL: height of the axes of that figure on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn.
+# Fraction of the axes below the energy in which the windows are drawn.
 _STRIP: Final = 0.07
 # Height of the energy axis, as a multiple of the largest energy shown.
 _HEADROOM: Final = 1.1
@@ -95,7 +95,7 @@ _MOST_PARTS: Final = 6
 # _TRADE_HEIGHT: height of the figure of ``explore`` in a file [inch].
 # _TRADE_PANEL: height of each axes of that figure on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space before the first td and after the last td, as a share of the axes, so that marks there are not cut off.
+# Space before the first td and after the last td, as a fraction of the axes, so that marks there are not cut off.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 # Palette of Okabe and Ito, except yellow, which is hard to see on white. Dashes distinguish lines of one colour.
@@ -118,12 +118,12 @@ _GREY: Final = "#808080"
 _DARK, _FAINTEST = 10, 0.02
 # If there are more runs than this number, their lines and marks are drawn thin.
 _MANY: Final = 40
-# _BEFORE: time shown before the first tr, as a share of the time from the first tr to td.
-# _AFTER: time shown after td, as a share of the time from the first tr to td.
+# _BEFORE: time shown before the first tr, as a fraction of the time from the first tr to td.
+# _AFTER: time shown after td, as a fraction of the time from the first tr to td.
 _BEFORE, _AFTER = 0.25, 0.15
 # Height of the figure of ``study`` in a file [inch].
 _HEIGHT: Final = 4.0
-# Height of a run's name, as a share of the axes.
+# Height of a run's name, as a fraction of the axes.
 _LINE: Final = 0.055
 # The line that connects a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}

@@ -44,7 +44,7 @@ def format_short(value: Cell) -> str:
 
 
 def format_measure(value: float | None) -> str:
-    """Format a share or an error with three decimals, such as 0.957; a dash if it is unknown.
+    """Format a fraction or an error with three decimals, such as 0.957; a dash if it is unknown.
 
     Examples
     --------

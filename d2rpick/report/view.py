@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown beyond each end of the flight, as a share of its length, so that load and landing are visible.
+# Time shown beyond each end of the flight, as a fraction of its length, so that load and landing are visible.
 _BEYOND = 0.06
 # LOGARITHMIC: the energy axis is logarithmic if the highest energy exceeds the target energy by more than this factor.
 # BELOW_LEVEL: a logarithmic energy axis begins at the target energy divided by this factor.
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# Space above and below the curve, as a share of the curve's height.
+# Space above and below the curve, as a fraction of the curve's height.
 _ROOM = 0.08
-# Share of a flight at each of its ends that is ignored, because the load or the landing may still act there.
+# Fraction of a flight at each of its ends that is ignored, because the load or the landing may still act there.
 _UNSURE = 0.01
 # Number of points of a curve, which gives a few dozen per oscillation cycle.
 _POINTS = 2000

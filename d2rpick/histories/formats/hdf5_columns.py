@@ -34,7 +34,7 @@ _ERF_BLOCK: Final = "/erfblock"
 # A table without column names is read only if it has at most this number of columns.
 _WIDEST: Final = 64
 
-# Largest share of the file for which a dataset is copied; a view would keep the whole file in memory.
+# Largest fraction of the file for which a dataset is copied; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
