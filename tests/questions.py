@@ -24,7 +24,7 @@ PAGES: Final = {
     "faq-solver": "Solver",
 }
 
-_INTRODUCTION: Final = "This page gives a short answer to each question. Each question links to the reason and the exceptions."
+_INTRODUCTION: Final = "Click a question for the reason and the exceptions."
 _ENTRY: Final = re.compile(
     r"^## (?P<topic>.+)$|^### (?P<title>.+)\n\n(?P<answer>.+(?:\n.+)*)",
     flags=re.MULTILINE,
@@ -44,7 +44,8 @@ class Question(NamedTuple):
     def short_answer(self) -> str:
         """The bold text that begins the answer; empty if there is none."""
         found = _SHORT_ANSWER.match(self.answer)
-        return " ".join(found[1].split()) if found else ""
+        text = " ".join(found[1].split()).rstrip(",") if found else ""
+        return text if not text or text.endswith(".") else f"{text}."
 
 
 def list_questions() -> Iterator[Question]:
