@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 # Largest number of states in the integration, which suffices because vibration hardly rotates a body.
 _STATES: Final = 2000
-# The final angular velocity is the mean over 1 / _LAST of the flight, so that vibration is averaged out.
+# Inverse of the fraction of the flight over which the final angular velocity is averaged, to remove vibration [-].
 _LAST: Final = 10
 
 
@@ -68,7 +68,7 @@ class Turning(NamedTuple):
     rate: Samples
 
     def compute_speed_at_front(self, direction: Samples) -> float:
-        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along it.
+        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along the vector.
 
         That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
         one [length/time].
@@ -106,14 +106,14 @@ class Turning(NamedTuple):
         )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body's frame [length]."""
+        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body frame [length]."""
         arm = _interpolate_at(self.time, self.arm, np.array([td]))
         return np.asarray(
             self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)
         )
 
     def _compute_slides(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) from ``tr`` to td, except those by rotation, in the body's frame [length]."""
+        """Return the displacements (k, 3) from ``tr`` to td without the part due to rotation, in the body frame."""
         at_td = _interpolate_at(self.time, self.place, np.array([td]))
         return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
 
@@ -267,7 +267,7 @@ def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | N
 def _integrate_velocities(
     momenta: Momenta, members: Sequence[int], mass: Samples
 ) -> Samples:
-    """Return how far the parts in these columns have moved since the run began, (n, parts, 3) [length].
+    """Return how far the parts in these columns have moved since the run began, shape (n, parts, 3) [length].
 
     The velocity before the first state is the one of that state.
     """
@@ -278,7 +278,7 @@ def _integrate_velocities(
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
-    """Return the places (n, parts, 3) of parts in a record that begins in the run, up to a displacement of all.
+    """Return the positions (n, parts, 3) of parts in a record within the run, up to a common displacement.
 
     Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
     the frame of the body: a part that vibrates on its mounts does so about its place.
@@ -346,7 +346,7 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 
 
 def _compute_turns(frames: Samples) -> Samples:
-    """Return the rotation from each frame to the next, (n - 1, 3) [rad], for small angles."""
+    """Return the rotation from each frame to the next, shape (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
     # The odd part of a rotation matrix holds its axis times the sine of its angle.
     odd = (between - between.transpose(0, 2, 1)) / 2
@@ -384,7 +384,7 @@ def _sum_running(steps: Samples) -> Samples:
 
 
 def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
-    """Return values (n, ...) at times (k,), linear between samples."""
+    """Return values (n, ...) at times (k,), interpolated linearly."""
     after = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     before = after - 1
     share = (when - time[before]) / (time[after] - time[before])
