@@ -34,6 +34,7 @@ _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Kinds of elements that stay deformable when their part is switched to rigid.
 DISCRETE: Final = frozenset({SPRING, "seatbelt"})
+_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
 
 class Hold(NamedTuple):
@@ -186,9 +187,6 @@ class Material(NamedTuple):
     density: float | None = None
     modulus: float | None = None
     poisson: float | None = None
-
-
-_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
 
 class Section(NamedTuple):

@@ -63,6 +63,8 @@ _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 _CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
+# End of the advice on a pair; it is omitted if the finished switched run is already available.
+_OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 def rank_candidates(
@@ -233,10 +235,6 @@ def list_exceeded_limits(
             is_td_wrong = of_td and quantity is not None
             exceeded.append(Excess(limit.explain(quantity, value), is_td_wrong))
     return tuple(exceeded)
-
-
-# End of the advice on a pair; it is omitted if the finished switched run is already available.
-_OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 class Cause(NamedTuple):
