@@ -385,8 +385,8 @@ def _sum_running(steps: Samples) -> Samples:
 
 def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), interpolated linearly."""
-    after = np.clip(np.searchsorted(time, when), 1, time.size - 1)
-    before = after - 1
-    share = (when - time[before]) / (time[after] - time[before])
+    next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
+    last_state = next_state - 1
+    share = (when - time[last_state]) / (time[next_state] - time[last_state])
     share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[before] * (1 - share) + values[after] * share)
+    return np.asarray(values[last_state] * (1 - share) + values[next_state] * share)

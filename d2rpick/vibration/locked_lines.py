@@ -107,10 +107,10 @@ def _find_side_lines(
     size = np.abs(lines.weights)
     rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
-    least = max(NOTABLE * float(size.max(initial=0.0)), ABOVE_SCATTER * scatter)
+    least_size = max(NOTABLE * float(size.max(initial=0.0)), ABOVE_SCATTER * scatter)
     middle_size = size * np.exp(lines.poles.real * span / 2)
     stretches = []
-    for first, second in combinations(np.flatnonzero(size > least).tolist(), 2):
+    for first, second in combinations(np.flatnonzero(size > least_size).tolist(), 2):
         if abs(np.log(middle_size[first] / middle_size[second])) > _SAME_HEIGHT:
             continue
         apart = np.abs(rate - rate[first] - rate[second]) * span

@@ -245,8 +245,8 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     half_period = np.pi / mode.omega
     still = mode.standstill_after(tr)
     # Times of zero velocity on both sides of tr, in columns: first those after each tr, then those before.
-    after, before = [0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]
-    steps = np.repeat([after, before], tr.size, axis=0).T * half_period
+    steps_after, steps_before = [0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]
+    steps = np.repeat([steps_after, steps_before], tr.size, axis=0).T * half_period
     # Between these times q is monotone.
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))

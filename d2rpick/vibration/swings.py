@@ -121,10 +121,10 @@ class Swings(SignedAmplitudes):
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(hidden_share) + _UNRESOLVED, wrong_sign(0.0)
         )
-        least = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
+        lowest_squared = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
         highest = np.hypot(_OF_ANY_SPRING * stated, hidden)
         likely = np.sqrt(np.square(stated) + np.minimum(hidden_share, 1.0) / 2)
-        return likely, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
+        return likely, np.sqrt(np.maximum(lowest_squared, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the share of the vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
@@ -336,9 +336,9 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
             hull.pop()
         hull.append(peak)
     vertices_after = [i for i, (t, _) in enumerate(hull) if t > middle]
-    right = vertices_after[0] if vertices_after else len(hull) - 1
-    t0, top0 = hull[max(right - 1, 0)]
-    t1, top1 = hull[right]
+    right_vertex = vertices_after[0] if vertices_after else len(hull) - 1
+    t0, top0 = hull[max(right_vertex - 1, 0)]
+    t1, top1 = hull[right_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
     # The vibration energy never rises, so the highest peak bounds it.
     if rate <= 0:
