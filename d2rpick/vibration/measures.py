@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Increase of the frozen-deformation error that ``timing_tolerance`` allows [-].
 TOLERATED_GROWTH = 0.05
+# Half-width of the error band of R^2 due to noise, in standard deviations; 2.5 cover 98.8 % of normal errors.
+BAND_DEVIATIONS = 2.5
 # The part of R^2 that depends on the phases at td is this factor times the damping ratio [-]; theory allows up to 2.
 _PHASES_COUNT = 1.5
 

@@ -96,8 +96,6 @@ _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 _VAGUE_HALF: Final = 0.2
 # Number of times at which the error band is evaluated.
 _SOME_TIMES: Final = 64
-# Half-width of the error band of R^2 in standard deviations, as for a single oscillator.
-_DEVIATIONS: Final = 2.5
 # Effect on R^2 of the part of the energy that the lines do not explain, as a factor on its share of the energy [-].
 # R^2 contains the energy at tr once and the energy halfway twice; 1.6 is a 90 % quantile of the normal distribution.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
@@ -378,7 +376,7 @@ class ModalVibration:
             np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
             / level
         )
-        deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
+        deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
             np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)

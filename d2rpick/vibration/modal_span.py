@@ -10,7 +10,7 @@ from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
-from d2rpick.vibration.span import Span
+from d2rpick.vibration.span import ERRORS_OFF, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,8 +24,8 @@ _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window, the record follows the modes as long as means over a part of the fastest period deviate little.
 # _MEANS_PER_PERIOD: number of energy means that are checked in each period of the fastest mode.
 # _MOST_OFF: largest deviation of an energy mean from the modes, as a share of the vibration energy [-].
-# _SCATTERS_OFF: largest deviation of an energy mean from the modes, in standard deviations of such means.
-_MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
+# ERRORS_OFF of an oscillator limits the deviation in standard errors.
+_MEANS_PER_PERIOD, _MOST_OFF = 8, 0.02
 # Largest number of times that a window is extended and identified again.
 _MOST_REFITS: Final = 3
 
@@ -161,7 +161,7 @@ def _count_up_to_last_off(
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(
             _MOST_OFF * vibration.vibration_energy(time[width - 1 :]),
-            _SCATTERS_OFF * vibration.noise / np.sqrt(width),
+            ERRORS_OFF * vibration.noise / np.sqrt(width),
         )
         is_off = np.flatnonzero(~(means <= room))
     return int(is_off[-1]) + width if is_off.size else 0

@@ -45,10 +45,10 @@ _LEAST_PERIODS, _MOST = 1.25, 0.8
 _MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
 # _SHARE_OFF: limit of the mean error as a share of the vibration energy [-].
-# _ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
+# ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
 # _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
 # _MEANS_PER_PERIOD: number of mean errors per period.
-_SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
+_SHARE_OFF, ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 # Number of means per energy period that are used to detect a mode in only a part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
 # An oscillator that describes at least this share of the bounds is used for every td in its window [-].
@@ -294,7 +294,7 @@ def _find_span_of_mode(
     typical_step = float(np.partition(steps, middle_rank)[middle_rank])
     # Number of samples in a mean.
     width = max(3, round(period / _MEANS_PER_PERIOD / typical_step))
-    room = max(_ERRORS_OFF * rms / np.sqrt(width), _STRUCTURES_OFF * structure)
+    room = max(ERRORS_OFF * rms / np.sqrt(width), _STRUCTURES_OFF * structure)
     middle = int(np.searchsorted(time, anchor))
     states_behind = width // 2
     ahead = (width - 1) // 2
@@ -518,7 +518,7 @@ def measure_deviations(
         fit.rms + fit.structure
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        beyond_noise = np.abs(sums) / states - _ERRORS_OFF * noise / np.sqrt(states)
+        beyond_noise = np.abs(sums) / states - ERRORS_OFF * noise / np.sqrt(states)
     # A cell without states has no value.
     deviations = np.nan_to_num(np.maximum(beyond_noise, 0.0), posinf=0.0)
     padded = np.pad(deviations, _MEANS_PER_ENERGY_PERIOD)
