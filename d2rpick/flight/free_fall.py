@@ -13,6 +13,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.flight.window import (
     FEWEST,
+    FEWEST_STATES_OF_WORK,
     ROUND_OFF,
     TOLERANCE,
     Constant,
@@ -64,8 +65,6 @@ _UNSEEN = 2.0
 _OF_WORK = 2e-3
 # Smallest relative excess of a mass written by the solver over the lower bound from momenta and energies [-].
 _CLEARLY_HEAVIER = 1e-6
-# Smallest number of states for a fit of work; it is twice the number of unknowns.
-_LEAST_STATES = 6
 
 
 class Laws:
@@ -419,7 +418,7 @@ def find_acceleration_by_work(
     """
     work = balance.kinetic_and_internal if balance.worked is None else balance.worked
     inside = find_window(balance.time, start, end)
-    if work is None or balance.time[inside].size < _LEAST_STATES:
+    if work is None or balance.time[inside].size < FEWEST_STATES_OF_WORK:
         return None
     impulse = integrate_by_trapezia(
         balance.time[inside], np.interp(balance.time[inside], time, momentum)

@@ -24,7 +24,7 @@ _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window, the record follows the modes as long as means over a part of the fastest period deviate little.
 # _MEANS_PER_PERIOD: number of energy means that are checked in each period of the fastest mode.
 # _MOST_OFF: largest deviation of an energy mean from the modes, as a share of the vibration energy [-].
-# ERRORS_OFF of an oscillator limits the deviation in standard errors.
+# Noise may cause deviations of up to ERRORS_OFF standard errors, as for one oscillator.
 _MEANS_PER_PERIOD, _MOST_OFF = 8, 0.02
 # Largest number of times that a window is extended and identified again.
 _MOST_REFITS: Final = 3

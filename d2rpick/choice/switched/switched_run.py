@@ -22,6 +22,7 @@ from d2rpick.base.errors import (
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import find_complete_stretches
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.history import Given, History
 from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.samples import find_stretches, find_window
@@ -43,8 +44,6 @@ _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance"
 _HARDLY: Final = 0.1
 # Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
-# Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
-SAME: Final = 1e-6
 # Largest number of output intervals after tr at which a flight that seems to begin may have begun before tr.
 _SAME_STATES: Final = 3
 
@@ -376,7 +375,7 @@ def detect_rigid_parts(
         return None
     energies = run.part_energies(parts)[inside]
     kinetic = give_if_written(lambda: run.part_kinetic_energies(parts))
-    still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
+    still = np.ptp(energies, axis=0) <= LAST_DIGIT * np.abs(energies).max(axis=0)
     if kinetic is not None:
         absent = (kinetic[inside] == 0).all(axis=0)
     else:
