@@ -57,6 +57,7 @@ _DOUBT: Final = 0.1
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
+# Microseconds per second.
 _US: Final = 1e6
 
 
