@@ -42,7 +42,7 @@ ROUNDING: Final = 1e-3
 # Number of decimals to which errors are rounded before comparison, so that round-off does not affect the ranking.
 _DECIMALS: Final = 4
 # Largest relative difference from the longest rigid time at which rigid times are treated as equal [-].
-_LIKE_TIMES = 0.1
+LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
@@ -186,7 +186,7 @@ def order_by_quality(
     longest = _find_extremes(
         np.maximum, group, np.where(is_like, rigid, -np.inf), groups
     )
-    is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
+    is_long = is_like & (rigid >= (1 - LIKE_TIMES) * longest[group])
     smallest_of_long = _find_extremes(
         np.minimum, group, np.where(is_long, error, np.inf), groups
     )
