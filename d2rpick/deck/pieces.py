@@ -183,7 +183,7 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds nodes of a piece. Fixed rotations count only if the translations are free."""
+    """Return True if a support holds nodes of a piece. Fixed rotations are ignored unless the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())

@@ -407,7 +407,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr, among those that are long enough to be planned if there are any."""
+    """Return the pairs with the most certain tr, only from those long enough to be planned if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
