@@ -50,7 +50,7 @@ _RESERVE: Final = 0.5
 # A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
 # A steady drift changes the mean energies of the two quarters by the width of the energy band.
 _DRIFT: Final = 0.35
-# Smallest number of swings over half of its range in a slow vibration; a crash has fewer swings.
+# Smallest number of oscillations over half of its range in a slow vibration; a crash has fewer.
 _SWINGS: Final = 4
 # Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75
