@@ -558,7 +558,8 @@ def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
     it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
     tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
 
-    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
+    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the body
+    also holds a part that stays deformable, do not delete it (D2R120): switch both parts, or neither.
     """
     return _find_active_constraints(case, nodal=True)
 
@@ -582,7 +583,7 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
 
-    Fix: Merge the parts by LRB, and switch all of them.
+    Fix: Switch all parts of the body and merge them by LRB, or switch none of them.
     """
     deleting = [
         event
