@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return the question whether an argument was meant in another unit, with the values in that of the record."""
+    """Return the question whether an argument was meant in another unit, with the converted values."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"
