@@ -44,7 +44,7 @@ _KNOWN, _TURNED = 3 / 4, 4
 # Largest energy that is treated as round-off, relative to the largest energy [-]; files have about seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# Widening of the energy band of the last quarter of a flight that contains all its energies, in band widths [-].
+# Widening of the energy band of a flight's last quarter such that it contains all its energies, in band widths [-].
 _RESERVE: Final = 0.5
 # Largest difference of the mean energies in the last two quarters of a flight, as a fraction of the energy band [-].
 # A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
