@@ -38,7 +38,7 @@ _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(
 _TRIED: Final = 2
 # Largest ratio to which omitting the next moving part reduces the unexplained displacement [-].
 _MORE_RIGID: Final = 0.5
-# Largest motion of the other parts in a rotation that is ignored, as a fraction of the moving part's motion [-].
+# Largest motion of the other parts in a rotation that is ignored, relative to the moving part's motion [-].
 _NOTABLE_WAY: Final = 0.1
 # Largest mass fraction of a single part at which the rotation of the body can be determined [-].
 _MOST_OF_BODY: Final = 0.95

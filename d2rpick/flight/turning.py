@@ -297,7 +297,7 @@ def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
 def _solve_turning(
     time: Samples, frames: Samples, everything: _Rotor, rigid: _Rotor
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of the rotation error psi: return propagation matrix, particular solution, effect of I(tr).
+    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect.
 
     ``frames`` (n, 3, 3) are those of the body, ``everything`` is all that flies and ``rigid`` the parts that become
     rigid.

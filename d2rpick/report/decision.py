@@ -42,7 +42,7 @@ def name_card_command(
     from d2rpick.deck.printing import SOLVERS, find_solver
 
     if SOLVERS[find_solver(history.format)].switches == "node":
-        # The main nodes of the rigid bodies that contain the parts come from the deck.
+        # The deck defines the main nodes of the rigid bodies that contain the parts.
         if history.parts and settings.bodies is not None:
             return "-f card"
         return "-f card --node IDS (the main nodes of the rigid bodies)"

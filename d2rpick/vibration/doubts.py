@@ -19,28 +19,28 @@ if TYPE_CHECKING:
 # Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
 _CHECKED: Final = 90
 
-# Largest prediction error, relative to the range of the energy, with which a record is not refused [-].
+# Largest prediction error of an accepted record, relative to the range of the energy [-].
 _MOST_MISSED: Final = 0.5
-# Largest misfit, relative to the range of the energy, with which a record is not refused [-].
+# Largest misfit of an accepted record, relative to the range of the energy [-].
 _MOST_MISFIT: Final = 0.3
 # MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
 # _MOST_NEGATIVE_AT_ALL: limit that replaces MOST_NEGATIVE if there is no better model [-].
 MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
-# Largest change of the static energy, relative to the mean vibration energy, with which a record is not refused [-].
+# Largest change of the static energy in an accepted record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
 # Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
 MOST_BEYOND: Final = 0.12
-# Largest size of harmonics, relative to their fundamental line, with which a record is not refused [-].
+# Largest size of the harmonics in an accepted record, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest energy of a static deformation that the static energy lacks [-].
+# _MOST_UNSTRETCHED: largest deficit of static energy for a static deformation, per mean vibration energy [-].
 # _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
-# Smallest number of states per period of the fastest strong line with which a record is not refused.
+# Smallest number of states in an accepted record per period of the highest-frequency strong line.
 _FEWEST_PER_PERIOD: Final = 2.4
 
 
 class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
+    """Indications that a record is not that of a linear structure in free flight; 0 means that there is no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -63,11 +63,11 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if no better model exists; None if it is accepted then."""
+        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason why the record is refused under the given limits."""
+        """Return the first reason why the record is refused under the given limits; None if there is no reason."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,

@@ -35,7 +35,7 @@ _USE_BEST: Final = (
     "or make fewer parts rigid (d2rpick parts)"
 )
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid (d2rpick parts)"
-# Largest difference between the worst-case and the expected residual at which the worst case is not shown [-].
+# Largest excess of the worst-case residual over the expected residual at which no worst case is shown [-].
 _ALIKE: Final = 5e-3
 
 
