@@ -10,6 +10,7 @@ import re
 import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, Final, NamedTuple
@@ -194,7 +195,7 @@ def read_sources() -> dict[str, Source]:
 
 
 def find_constants(sources: Mapping[str, Source]) -> list[Constant]:
-    """List the numeric constants at module level of `PACKAGES`; zeros and truth values are none."""
+    """List the numeric constants at module level of `PACKAGES`; zeros, infinity and truth values are none."""
     constants = []
     for source in sources.values():
         module = source.module
@@ -213,7 +214,7 @@ def _is_number(value: object) -> bool:
     if isinstance(value, tuple) and value:
         return all(_is_number(element) for element in value)
     is_numeric = isinstance(value, float | int) and not isinstance(value, bool)
-    return is_numeric and value != 0
+    return is_numeric and value != 0 and isfinite(value)
 
 
 def find_uses(sources: Mapping[str, Source], constant: Constant) -> Uses:
