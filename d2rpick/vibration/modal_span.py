@@ -10,7 +10,7 @@ from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
-from d2rpick.vibration.span import ERRORS_OFF, Span
+from d2rpick.vibration.span import ERRORS_OFF, MOST_REFITS, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,8 +26,6 @@ _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # _MOST_OFF: largest deviation of the mean energy from the modes' prediction, relative to the vibration energy [-].
 # The mean energy may also deviate by ERRORS_OFF standard errors from that predicted by the modes.
 _MEANS_PER_PERIOD, _MOST_OFF = 8, 0.02
-# Largest number of times that a window is extended and its modes are identified again.
-_MOST_REFITS: Final = 3
 
 
 class ModalWindow(NamedTuple):
@@ -113,7 +111,7 @@ def _identify_states(
 
 def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
     """Extend a window as far as the record follows its modes and identify these again, until it no longer changes."""
-    for _ in range(_MOST_REFITS):
+    for _ in range(MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
             break

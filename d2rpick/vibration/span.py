@@ -54,7 +54,7 @@ _MEANS_PER_ENERGY_PERIOD = 4
 # Smallest fraction of the bounds described by an oscillator that is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
-_MOST_REFITS = 8
+MOST_REFITS = 8
 
 # Largest ignored energy of a hidden mode, as a fraction of the vibration energy [-]; it is the error of solvers.
 SMALLEST: Final = 1e-3
@@ -410,7 +410,7 @@ def _grow_span(
     bounds = search.bounds
     fit = search.fit(window)
     span = window
-    for _ in range(_MOST_REFITS):
+    for _ in range(MOST_REFITS):
         if not fit.follows or fit.mode is None:
             return None, fit
         shortest = max(
