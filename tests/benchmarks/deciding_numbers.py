@@ -18,13 +18,14 @@ import argparse
 import csv
 import gc
 import multiprocessing
+import re
 import signal
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -51,6 +52,8 @@ ENOUGH: Final = 3
 _PATIENCE, _LEAST_PATIENCE = 20.0, 5.0
 # Longest text of a value, or of a question, in the table.
 _TEXT = 24
+# End of the first sentence of a comment, which says what a constant decides; the others give its source or the reason.
+_FIRST_SENTENCE: Final = re.compile(r"(?<=\.) (?=[A-Z_])")
 
 _HEAD: Final = (
     "constant",
@@ -237,7 +240,11 @@ def describe_change(before: Answer, after: Answer, place: str = "") -> str:
         return ""
     if before == after:
         return ""
-    return f"{place}: {str(before)[:_TEXT]} → {str(after)[:_TEXT]}"
+    texts = str(before), str(after)
+    equal = takewhile(lambda pair: pair[0] == pair[1], zip(*texts, strict=False))
+    first = max(len(list(equal)) - _TEXT // 2, 0)
+    short = [text if len(text) <= _TEXT else text[first:][:_TEXT] for text in texts]
+    return f"{place}: {short[0]} → {short[1]}"
 
 
 def call_in_child(function: Callable[[], Any]) -> Any:
@@ -289,10 +296,8 @@ def write_table(
     for name, constant in constants.items():
         row = rows.get(name, Row(name, f"{constant.value}", "", "", ""))
         rank = 2 if not row.halved else int(not row.decides)
-        meaning, _, source = constant.comment.partition("].")
-        if source:
-            meaning += "]."
-        lines.append((rank, [*row, meaning, source.strip()]))
+        meaning, *sources = _FIRST_SENTENCE.split(constant.comment, maxsplit=1)
+        lines.append((rank, [*row, meaning, *(sources or [""])]))
     lines.sort(key=lambda line: line[0])
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 # Largest number of halvings of a sampling interval, with which the end of a window is found to 1e-6 of the interval.
 _HALVINGS: Final = 20
-_BELOW = 1e-12
+# Relative margin by which a level lies below the highest energy, so that rounding does not hide the crossing [-].
+_BELOW: Final = 1e-12
 
 # Largest deviation of the error from its polyline [-]; this is half a unit of the last printed digit.
 _EXACT: Final = 5e-4
