@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.geometry import Placement
-    from d2rpick.flight.body_frame import Displacements
+    from d2rpick.flight.body_frame import Displacements, Frame
     from d2rpick.histories.history import Momenta, Samples
 
 # Largest number of states in the integration, which suffices because vibration hardly rotates a body.
@@ -151,6 +151,17 @@ class _FlyingParts(NamedTuple):
         return [rows[column] for column in columns]
 
 
+class _Motion(NamedTuple):
+    """Motion of the flying parts at times ``time`` (n,): the ``frame`` of the body, and ``places`` (n, parts, 3) in it.
+
+    The places are relative to the centre of mass of all that flies [length].
+    """
+
+    time: Samples
+    frame: Frame
+    places: Samples
+
+
 class _Rotor(NamedTuple):
     """What rotates, in the frame of the body: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) from state to state.
 
@@ -181,10 +192,65 @@ def follow_turning(
     frame_columns = choose_frame_parts(
         seen.members, moving, momenta.parts, seen.masses, placement
     )
+    motion = _follow_parts(seen, flying, frame_columns, placement, displacements)
+    if motion is None:
+        return None
+    time, frame, places = motion
+
+    own_inertia = compute_inertia(np.einsum("p,pij->ij", masses, flying.spreads))
+    point_inertia = compute_inertia(compute_second_moments(places, masses))
+    everything = _Rotor(point_inertia + own_inertia, _integrate_spin(places, masses))
+    rigid_rows = flying.find_rows(seen.members)
+    rigid_places, rigid_masses = places[:, rigid_rows], masses[rigid_rows]
+    rigid = _Rotor(
+        compute_inertia(compute_second_moments(rigid_places, rigid_masses)),
+        _integrate_spin(rigid_places, rigid_masses),
+    )
+    carried, pushed, kept = _solve_turning(time, frame.axes, everything, rigid)
+
+    # The centre of the parts that define the frame, in the frame and in the deck.
+    frame_rows = flying.find_rows(frame_columns)
+    frame_centre = _weigh_by_mass(places[:, frame_rows], masses[frame_rows])
+    deck_centre = _weigh_by_mass(flying.centres[frame_rows], masses[frame_rows])
+    mass_times_shift = np.einsum(
+        "p,npi->ni", rigid_masses, rigid_places - frame_centre[:, np.newaxis]
+    )
+    arm = frame_centre
+    watched_centre = placement.watched_centre(
+        momenta.parts[column].id for column in frame_columns
+    )
+    if watched_centre is not None:
+        arm = frame_centre + (watched_centre - deck_centre)
+    nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
+    nodes_at_end = (nodes - deck_centre + frame_centre[-1]) @ frame.axes[-1].T
+    return Turning(
+        time=time,
+        place=mass_times_shift / masses.sum(),
+        arm=arm,
+        inertia=rigid.inertia,
+        carried=carried,
+        pushed=pushed,
+        kept=kept,
+        doubt=frame.doubt,
+        nodes=nodes_at_end,
+        frame=frame.axes[-1],
+        rate=_compute_last_rate(time, frame.axes),
+    )
+
+
+def _follow_parts(
+    seen: Flying,
+    flying: _FlyingParts,
+    frame_columns: Sequence[int],
+    placement: Placement,
+    displacements: Displacements | None,
+) -> _Motion | None:
+    """Follow the frame of the body and the flying parts in it; None if nothing determines the frame."""
+    momenta = seen.momenta
+    assert momenta.parts is not None
     frame_ids = [momenta.parts[column].id for column in frame_columns]
     frame_rows = flying.find_rows(frame_columns)
-    rigid_rows = flying.find_rows(seen.members)
-
+    masses = flying.masses
     inside = find_window(momenta.time, seen.start, seen.end)
     stride = -(-(inside.stop - inside.start) // _STATES)
     time = momenta.time[inside][::stride]
@@ -204,44 +270,9 @@ def follow_turning(
         return None
     if not begins_with_run:
         positions = _place_by_frames(flying.centres, travel, frame.axes)
-
-    # From here on, places are in the frame of the body, relative to the centre of mass of all that flies.
     centre_of_mass = _weigh_by_mass(positions, masses)
     places = (positions - centre_of_mass[:, np.newaxis]) @ frame.axes
-    frame_centre = _weigh_by_mass(places[:, frame_rows], masses[frame_rows])
-    own_inertia = compute_inertia(np.einsum("p,pij->ij", masses, flying.spreads))
-    point_inertia = compute_inertia(compute_second_moments(places, masses))
-    everything = _Rotor(point_inertia + own_inertia, _integrate_spin(places, masses))
-    rigid_places, rigid_masses = places[:, rigid_rows], masses[rigid_rows]
-    rigid = _Rotor(
-        compute_inertia(compute_second_moments(rigid_places, rigid_masses)),
-        _integrate_spin(rigid_places, rigid_masses),
-    )
-    carried, pushed, kept = _solve_turning(time, frame.axes, everything, rigid)
-
-    mass_times_shift = np.einsum(
-        "p,npi->ni", rigid_masses, rigid_places - frame_centre[:, np.newaxis]
-    )
-    deck_centre = _weigh_by_mass(flying.centres[frame_rows], masses[frame_rows])
-    watched_centre = placement.watched_centre(frame_ids)
-    arm = frame_centre
-    if watched_centre is not None:
-        arm = frame_centre + (watched_centre - deck_centre)
-    nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
-    nodes_at_end = (nodes - deck_centre + frame_centre[-1]) @ frame.axes[-1].T
-    return Turning(
-        time=time,
-        place=mass_times_shift / masses.sum(),
-        arm=arm,
-        inertia=rigid.inertia,
-        carried=carried,
-        pushed=pushed,
-        kept=kept,
-        doubt=frame.doubt,
-        nodes=nodes_at_end,
-        frame=frame.axes[-1],
-        rate=_compute_last_rate(time, frame.axes),
-    )
+    return _Motion(time, frame, places)
 
 
 def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | None:

@@ -535,7 +535,7 @@ def _read(
         systematic * spectrum.rest,
         _TINY * prediction.swing,
     )
-    interpretation = _interpret(
+    interpretation = _choose_interpretation(
         plain, stretches, may_be_spring=may_be_spring, kinetic=kinetic
     )
     reading = interpretation.best
@@ -562,7 +562,7 @@ def _read(
     )
 
 
-def _interpret(
+def _choose_interpretation(
     plain: Reading,
     stretches: tuple[StretchLine, ...],
     *,
