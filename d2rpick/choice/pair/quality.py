@@ -330,7 +330,7 @@ class Quality(NamedTuple):
 
 
 def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade a recommended tr by the motion after td and by its vibration error, also relative to the next contact."""
+    """Grade a recommended tr by its motion, by its vibration error, and by that error relative to the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
     outside = list_times_outside_flight(situation, best.tr)
