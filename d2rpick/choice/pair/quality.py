@@ -344,7 +344,7 @@ def _explain_uncertain_flight(flight: Flight) -> Cause:
 
 
 def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade a recommended tr by the motion after td and by its vibration error, also relative to the next contact."""
+    """Grade a recommended tr by its motion, by its vibration error, and by that error relative to the next contact."""
     flight = situation.flight
     uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)

@@ -213,7 +213,7 @@ def compare_runs(
 def _select_energies_after(
     switched: History, td: float, end: float
 ) -> tuple[Samples, float | None]:
-    """Return the energies of the switched run from td to ``end``, and the reported energy of the rigid parts if wrong.
+    """Return the energies of the switched run from td to ``end``, and the energy reported while rigid if it is wrong.
 
     The second value is the energy that the solver reports while the parts are rigid, None if it is right.
     """
