@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
+    from d2rpick.report.formats import RepeatedQuestion
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
@@ -267,6 +268,18 @@ class Request(ChoiceOptions, ReadingOptions):
             text for name in self.history for text in ("--history", name)
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
+
+    def repeat(self) -> RepeatedQuestion:
+        """Return the words of the command line with which other commands ask about the same run."""
+        from d2rpick.report.formats import RepeatedQuestion
+
+        names = [name for name in self._given() if name != "part"]
+        return RepeatedQuestion(
+            parts=self.asking(("part",)),
+            options=self.asking(names),
+            judging=(*self.judging(), *self.asking(("deck", "no_deck"))),
+            files=self.history,
+        )
 
     def without_history(self) -> None:
         """Refuse options for judging if there is no history by which to judge."""

@@ -72,7 +72,6 @@ _OTHERS: Final = {
     "replay": "no_verify",
     "run": "history",
 }
-_FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 # Output forms that already explain why nothing is recommended.
 IN_WORDS: Final = {"table", "markdown"}
 
@@ -193,7 +192,7 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested form."""
         now = self.shown(**display_options)
-        text = replace_arguments_for_people(
+        text = name_options_and_wrap(
             answer.text(self.output_format, now), self.output_format, now.width
         )
         self.result(f"{text}\n\n{below}" if below else text)
@@ -426,20 +425,14 @@ def find_option(argument: str) -> str:
     return f"--{make_option_name(name)}" if name in ARGUMENTS else ""
 
 
-def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
-    """Replace argument names with options in a result for people, and wrap it to ``width`` columns.
-
-    Results for programs keep the argument names.
+def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
+    """Replace argument names with options in a result, and wrap a table to ``width`` columns.
 
     Examples
     --------
-    >>> replace_arguments_for_people("choose with `energy`", "table")
+    >>> name_options_and_wrap("choose with `energy`", "table")
     'choose with --energy'
-    >>> replace_arguments_for_people("choose with `energy`", "json")
-    'choose with `energy`'
     """
-    if form in _FOR_PROGRAMS:
-        return text
     text = replace_arguments(text)
     if form != "table" or not width:
         return text

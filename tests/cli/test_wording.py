@@ -60,6 +60,6 @@ def test_the_command_line_names_the_option_that_cures() -> None:
         run("study", "--td", "0.37", ROLLOVER).stdout
     )
     assert (
-        "choose with `energy`: "
+        "choose with --energy: "
         in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout
     )
