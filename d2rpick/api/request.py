@@ -269,15 +269,17 @@ class Request(ChoiceOptions, ReadingOptions):
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
-    def repeat(self) -> RepeatedQuestion:
+    def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
         """Return the words of the command line with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
-        names = [name for name in self._given() if name != "part"]
+        left_out = {"part", *without}
+        names = [name for name in self._given() if name not in left_out]
+        of_deck = {"deck", "no_deck"} - left_out
         return RepeatedQuestion(
             parts=self.asking(("part",)),
             options=self.asking(names),
-            judging=(*self.judging(), *self.asking(("deck", "no_deck"))),
+            judging=(*self.judging(), *self.asking(of_deck)),
             files=self.history,
         )
 

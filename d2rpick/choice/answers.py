@@ -666,38 +666,6 @@ def verify_run(
     return _add_health(verdict, reference.run)
 
 
-def compare_with(
-    verdict: PairVerdict,
-    reference: Reference,
-    switched: Reference,
-    min_mean: float = 0.0,
-) -> PairVerdict:
-    """Add the comparison of a finished switched run with the reference run to a verdict.
-
-    Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
-    of the reference run [-].
-
-    Raises
-    ------
-    RangeError
-        If one of the two runs does not continue after td.
-    """
-    from d2rpick.choice.switched.comparison import compare_with_reference
-
-    comparison = compare_with_reference(
-        verdict.situation, verdict.candidate.tr, reference, switched, min_mean
-    )
-    return replace(
-        verdict,
-        switched=comparison,
-        computed=switched.history,
-        # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
-        admissible=verdict.admissible and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
-        cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
-    )
-
-
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
     """Add the health of the run, with its warnings, in the rigid window or else in the flight up to td.
 

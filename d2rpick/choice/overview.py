@@ -130,7 +130,7 @@ class Overview(NamedTuple):
         if self._is_spent:
             return (
                 f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
-                "choose times from the run without switching, and compare this one with it (d2rpick verify)"
+                "choose times from the reference run, and compare this one with it (d2rpick verify)"
             )
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary

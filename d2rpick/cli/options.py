@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
+from d2rpick.api.option_names import replace_arguments
 from d2rpick.api.request import (
     ADVANCED,
     CHOOSING,
@@ -23,7 +24,7 @@ from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import TIME, Option, list_options, make_option_name
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
-from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
+from d2rpick.cli.output import Output, encode_text, tell
 from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
     CARDS,

@@ -114,7 +114,7 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
         ]
     step = f"next  {_name_next_step(checks)}"
     return "\n".join(
-        [*map(make_printable, lines), "", _summarize_findings(checks), step]
+        [*map(make_printable, lines), "", step, _summarize_findings(checks)]
     )
 
 
@@ -136,7 +136,7 @@ def _name_next_step(checks: Checks) -> str:
         return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
     if checks.history is None:
         command = tables.quote_shell_line(("d2rpick", "check", *decks))
-        return f"judge the times by the history of the run without switching: {command} --history HISTORY"
+        return f"judge the times by the reference run: {command} --history HISTORY"
     history = tables.make_positional(checks.history)
     grades = [
         window.decision.grade

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from d2rpick.api.option_names import ARGUMENTS, find_option, replace_arguments
 from d2rpick.cli import COMMANDS
-from d2rpick.cli.output import ARGUMENTS, find_option, replace_arguments
 from tests.command import ENERGY, ROLLOVER, ROOT, join_wrapped_lines, run
 
 # Layers whose messages name no options.

@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import bound_mean_energy
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.pair.quality import (
-    KINETIC_AT_TD,
-    MOST_WORTH_OF_FAIR,
-    grade_pair,
-)
+from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR, grade_pair
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -99,12 +95,7 @@ class Decision(NamedTuple):
     def reason(self) -> str:
         """Reason for the verdict."""
         if self.objections:
-            of_td = (
-                cause.reason
-                for cause in self.quality.vibration.causes
-                if cause.kind == KINETIC_AT_TD
-            )
-            return "; ".join((*self.objections, *of_td))
+            return "; ".join(self.objections)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
         reasons = "; ".join(self.quality.reasons)

@@ -59,9 +59,6 @@ MOST_WORTH_OF_FAIR: Final = 0.05
 _ENOUGH_STATES: Final = 200
 # A sentence names at most this number of parts.
 _NAMED: Final = 5
-KINETIC_AT_TD: Final = (
-    "most of the vibration energy is kinetic at td, which no tr can keep"
-)
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 _CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
@@ -454,7 +451,7 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
         f"{reason}, since {share:.0%} of its energy is kinetic at td, which no tr can keep",
         "use d2rpick explore to see whether another td is better",
         needs_other_times=True,
-        kind=KINETIC_AT_TD,
+        kind="most of the vibration energy is kinetic at td, which no tr can keep",
     )
 
 

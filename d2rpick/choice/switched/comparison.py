@@ -411,9 +411,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
         early = reference.start + _EARLY * reference.duration
-        foreign = "; ".join(check_same_model(reference, switched, early))
-        if foreign:
-            raise RangeError(f"{', '.join(switched.source)}: {foreign} ({reason})")
+        reason = "; ".join((*check_same_model(reference, switched, early), reason))
         cure = (
             switched.left_beside
             or "; give the run with the switching cards, or `tr` and `td`"

@@ -71,5 +71,5 @@ def refuse_switched(history: History, start: float | None, td: float) -> None:
     windows = list_names([f"{begin:.6g} to {end:.6g}" for begin, end in rigid])
     raise RangeError(
         f"{', '.join(history.source)}: this is a switched run: the internal energy is frozen from {windows}; choose "
-        "times from the run without switching, and compare this one with it (d2rpick verify)"
+        "times from the reference run, and compare this one with it (d2rpick verify)"
     )
