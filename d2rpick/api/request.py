@@ -328,11 +328,15 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
-        if quantity not in QUANTITIES or not name:
+        if quantity not in QUANTITIES and name:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            quantities = near or f", with one of {', '.join(QUANTITIES)}"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected{quantities}"
+                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{near}, one of {', '.join(QUANTITIES)} "
+                "was expected"
+            )
+        if not name:
+            raise ArgumentError(
+                f"`channels` {quantity}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")

@@ -579,6 +579,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "
             f"{flight.start:.6g} to {flight.end:.6g}; give a smaller `margin`"
         )
+    if not situation.history.energy.any():
+        return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
     if not ranked:
         level = situation.energy_td
         return (
@@ -586,7 +588,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             "peaks near it"
         )
     if situation.td > situation.latest_td:
-        return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
+        reasons = "; ".join(list_objections_to_td(situation)).removeprefix("td ")
+        return f"td = {situation.td:.6g} lies {reasons}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))

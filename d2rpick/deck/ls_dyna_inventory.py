@@ -304,7 +304,7 @@ def _list_notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
         if not _is_readable(card)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in deck.unread
     )
     for block in deck.encrypted:

@@ -37,17 +37,21 @@ def name_step_to_card(
     windows: Sequence[tuple[float, float]],
     question: RepeatedQuestion,
     command: str,
+    *,
+    flying: bool,
 ) -> str:
     """Return the step that prints the card of windows, with ``command`` (``suggest`` or ``plan``) or with ``card``.
 
-    If the files contain parts but none was chosen, the step is to choose the parts.
+    If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
     """
     from d2rpick.deck.printing import SOLVERS, find_solver
 
     is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
-    if history.parts and not question.parts and not is_radioss:
-        flying = write_command(question, command, *question.times, new_parts=["flying"])
-        return f"choose the parts to switch, for example those that fly, with {flying}"
+    is_chosen = question.parts or "--energy" in question.options
+    if flying and not is_chosen and not is_radioss:
+        again = "verify" if command == "card" else command
+        line = write_command(question, again, *question.times, new_parts=["flying"])
+        return f"choose the parts to switch, for example those that fly, with {line}"
     # Only `card` accepts parts that the history does not contain.
     if command != "card" and (history.parts or is_radioss):
         words = (*question.times, "-f", "card")

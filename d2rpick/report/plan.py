@@ -300,7 +300,12 @@ def list_next_steps(
         return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
     cards = name_step_to_card(
-        plan.history, plan.settings, plan.next_run, question, "plan"
+        plan.history,
+        plan.settings,
+        plan.next_run,
+        question,
+        "plan",
+        flying=any(row.flight.by_parts for row in plan.flights),
     )
     if plan.done:
         cards += "; they also contain the windows that are done"

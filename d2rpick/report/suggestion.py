@@ -240,6 +240,7 @@ def list_next_step(
             [(pair.tr, pair.td)],
             question,
             "suggest",
+            flying=situation.flight.by_parts,
         )
     return [("next", step)]
 

@@ -144,6 +144,7 @@ def list_next_step(
             [(offer.tr, offer.td)],
             question._replace(times=times),
             "suggest",
+            flying=situation.flight.by_parts,
         )
     return [("next", step)]
 

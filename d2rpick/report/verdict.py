@@ -128,6 +128,7 @@ def list_next_step(
             [(answer.candidate.tr, answer.td)],
             question,
             "card",
+            flying=situation.flight.by_parts,
         )
     return [("next", step)]
 

@@ -183,6 +183,7 @@ BOX_ONLY = ("--part", "box", MATSUM)
         ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
         ("verify", "--tr", "0.0135", "--td", "0.064", ENERGY),
         ("verify", *WITH_CARE, MATSUM),
+        ("verify", *WITH_CARE[:4], MATSUM),
         ("verify", "--deck", DECK, *WITH_CARE, MATSUM),
         ("verify", *DO_NOT_USE, MATSUM),
         ("parts", MATSUM),

@@ -340,8 +340,8 @@ def check_same_model(
     difference = float(np.abs(switched.energies_at(time) - energy).max()) / largest
     if difference > _OF_ANOTHER_MODEL:
         yield (
-            f"the energies of the two runs differ by {difference:.0%} before {end:.6g}, when both are deformable: are "
-            "they runs of the same model?"
+            f"the energies of the two runs differ by {difference:.0%} before {end:.6g}, when both are deformable, so "
+            "they seem to be runs of different models"
         )
 
 
