@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 Times = tuple[float, float]
-# A part was rigid if it has no kinetic energy, or constant internal energy, in this many consecutive states.
+# Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
 # Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
 SAME: Final = 1e-6
-# An energy vibrates if it changes by more than this multiple of the change up to which it is constant [-].
+# Smallest change of a vibrating energy, in multiples of the change up to which an energy is constant [-].
 _MUCH: Final = 100.0
 
 
