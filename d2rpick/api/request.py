@@ -336,7 +336,7 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
             )
         if not name:
             raise ArgumentError(
-                f"`channels` {quantity}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")

@@ -161,7 +161,7 @@ def refuse_unknown_settings(
             named_table = f" {table}:" if table else ""
             raise ConfigurationError(
                 f"{place}:{named_table} unknown key {name!r}{hint}, one of {names_of_keys} was expected; "
-                "correct or delete the line (--show-settings lists the keys of a command)"
+                "--show-settings lists those of a command"
             )
 
 

@@ -579,7 +579,7 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "
             f"{flight.start:.6g} to {flight.end:.6g}; give a smaller `margin`"
         )
-    if not situation.history.energy.any():
+    if not (situation.history.parts or situation.history.energy.any()):
         return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
     if not ranked:
         level = situation.energy_td

@@ -6,7 +6,6 @@ takes 1 % of a processor core.
 
 from __future__ import annotations
 
-import os
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -120,9 +119,7 @@ class Watch:
         """Return a sentence that states whether the parts fly now, and since when."""
         time, message = None, "no flight yet"
         if self._last_time is None:
-            absent = not any(map(os.path.lexists, self._names))
-            found = "this name does not exist yet" if absent else "no file of a run yet"
-            message = f"{list_names(self._names)}: {found}; check the name if the run has begun"
+            message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
