@@ -194,7 +194,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         _build_parts(deck, parts, mesh),
         mesh.elements,
         mesh.coordinates,
-        notes,
+        (*notes, *_note_switching_cards(deck)),
         parts.all_known and not notes,
         joints=place_nodes(joints.found, mesh.table),
         ties=joints.unknown,
@@ -206,6 +206,15 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
             deck, parts, (ids, coordinates, codes)
         ).placed(mesh.table),
     )
+
+
+def _note_switching_cards(deck: Deck) -> Iterator[str]:
+    """Yield a note on the first card with which the deck already switches parts."""
+    for card in deck.named("DEFORMABLE_TO_RIGID")[:1]:
+        yield (
+            f"{card.at}: the deck already switches parts with *{card.name}; remove its switching cards before you add "
+            "others"
+        )
 
 
 def find_shared_nodes(

@@ -85,8 +85,10 @@ def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
     [
         (
             " Livermore Software Technology\n" + " text\n" * 60,
-            "this is a listing of LS-DYNA; a table of time and energy was expected; give the "
-            "glstat, matsum or binout of the run",
+            (
+                "this is a listing of LS-DYNA; a table of time and energy was expected; give the "
+                "glstat, matsum or binout of the run"
+            ),
         ),
         (
             "time,internal_energy\n0,1\n1,2\n",

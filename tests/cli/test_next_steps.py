@@ -241,3 +241,14 @@ def test_a_pair_at_a_better_td_has_its_verdict_in_json() -> None:
 
 def test_a_mistyped_option_is_compared_with_the_nearest_only() -> None:
     assert "Did you mean '--td'?" in run("suggest", "--tdd", "1", ENERGY).stderr
+
+
+def test_a_deck_that_already_switches_its_parts_is_named(tmp_path: Path) -> None:
+    options = ("--part", "1,2", "--deck", DECK)
+    assert "already switches" not in run("plan", *options, MATSUM).stderr
+    folder = tmp_path / "next"
+    run("plan", *options, "--write-deck", str(folder), MATSUM)
+    deck = str(folder / "rollover_box.k")
+    text = run("plan", "--part", "1,2", "--deck", deck, MATSUM).stderr
+    assert "the deck already switches parts with *DEFORMABLE_TO_RIGID_AUTOMATIC" in text
+    assert "remove its switching cards" in text
