@@ -71,7 +71,7 @@ def find_nearest_settings(folder: str) -> NearestSettings:
 
 
 def _list_searched_folders(folder: str) -> Iterator[str]:
-    """Yield a folder and those above it, up to the root of its repository or to the user's home.
+    """Yield a folder and the folders above it, up to the root of its repository or to the user's home.
 
     Outside both, the search ends below the first folder that another user owns, and below the root of the system.
     """

@@ -36,13 +36,13 @@ MOST_IMBALANCE = 0.10
 # MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a fraction of the peak internal energy [-].
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# _TINY_SHARE: internal energies below this fraction of the run's largest energy are treated as rounding errors [-].
+# _TINY_SHARE: largest internal energy treated as a rounding error, as a fraction of the run's largest energy [-].
 # _TINY_SHARE follows from the precision of the files: single precision and glstat have six to seven digits.
-# _FLOOR: internal energies below this are treated as 0 [energy]; LS-DYNA's start at 2e-20 per process.
+# _FLOOR: largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
-# Parts whose internal energy is below this fraction of the largest part energy are ignored [-].
+# Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01
-# The energy ratio is used only while its reference energy exceeds this fraction of its peak [-].
+# Smallest reference energy at which the energy ratio is used, as a fraction of the peak of the reference energy [-].
 # If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
@@ -52,15 +52,15 @@ OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
 # _WITHIN: fraction of the record within which a diverged run meets the following three criteria [-].
-# _GAIN: in a diverged run, the kinetic energy exceeds all earlier energies by this factor [-].
-# _SPEED: in a diverged run, the kinetic energy exceeds the internal energy by this factor [-].
-# _TORN: in a diverged run, the internal energy grows by this factor, because elements are torn [-].
+# _GAIN: smallest ratio of the kinetic energy of a diverged run to all earlier energies [-].
+# _SPEED: smallest ratio of the kinetic energy of a diverged run to the internal energy [-].
+# _TORN: smallest growth factor of the internal energy of a diverged run, in which elements are torn [-].
 # Sound runs do not meet all three criteria of a diverged run, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
 # Smallest number of earlier states with energy needed to recognise a diverged run; first states may be round-off.
 _FEWEST: Final = 12
-# Energies below this value are treated as zero in any unit system, because those of LS-DYNA start at 2e-20.
+# Largest energy that is treated as zero in any unit system, because energies of LS-DYNA start at 2e-20.
 _NOTHING: Final = 1e-20
 
 

@@ -107,7 +107,7 @@ class DataLine:
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
-        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, by the type of its column."""
+        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, as its column requires."""
         assert values.keys() <= self._columns.keys()
         defaults: dict[Kind, Cell] = {int: 0, float: 0.0, str: ""}
         return "".join(

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _WIDEST: Final = 240  # Number of characters of the longest line of a mesh.
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-# Characters that show that a line has no fixed columns, so that it must be parsed separately.
+# Characters that occur only in lines without fixed columns, which must be parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
 # Index of the last character of most ids; a line with a character at this index is not blank.
 _ID_ENDS: Final = 7

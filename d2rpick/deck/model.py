@@ -453,7 +453,7 @@ class Inventory:
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the numbers of elements that are rigid once these parts are rigid bodies, by part and kind.
+        """Return the numbers of elements that are rigid once these parts are rigid bodies, keyed by part id and kind.
 
         Radioss deactivates every element whose nodes all lie in a body, LS-DYNA the elements of the switched parts.
         """
@@ -466,7 +466,7 @@ class Inventory:
         return counts_by_part
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the numbers of elements whose nodes all belong to these parts, by part and kind."""
+        """Return the numbers of elements whose nodes all belong to these parts, keyed by part id and kind."""
         # The index NO_NODE is -1, and therefore selects this last entry.
         inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}

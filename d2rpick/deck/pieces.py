@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Cached piece numbers of the nodes of each deck; they are cached because a mesh may have millions of nodes.
+# Cached numbers of the connected piece of each node; they are cached because a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
@@ -183,7 +183,7 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds nodes of a piece. Fixed rotations count only if the translations are free."""
+    """Return True if a support holds nodes of a piece. Fixed rotations are ignored unless the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
@@ -230,7 +230,7 @@ def _find_symmetry_axes(
 
 
 def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bool:
-    """Return True if the fixed nodes are all nodes on a plane that bounds the piece."""
+    """Return True if the fixed nodes are all nodes on a plane that bounds the connected piece."""
     plane = heights[fixed][0]
     on_plane = np.abs(heights - plane) <= tolerance
     one_side = heights.min() >= plane - tolerance or heights.max() <= plane + tolerance

@@ -582,7 +582,7 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
 
 # Joints connect parts that share no nodes: ties, and rigid bodies that are always active.
 # Joints must be inactive while a part is rigid, because a node cannot belong to two rigid bodies.
-# Altair's help on incompatible kinematic conditions states that a node cannot belong to two rigid bodies.
+# The source of the rule on joints is Altair's help on incompatible kinematic conditions.
 
 
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:

@@ -173,7 +173,7 @@ def find_contacts_of_sensor(
 
 
 def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
-    """Return the input sensors of a sensor."""
+    """Return the sensors that are the inputs of a sensor."""
     card = starter.sensors.get(number)
     rows = (
         get_lines_below_title(card)

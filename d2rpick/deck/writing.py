@@ -479,7 +479,7 @@ class DrivenDeck(NamedTuple):
 
 
 def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
-    """Read a run that is to be driven, which means that its switch times are chosen while it is computed.
+    """Read a run whose switch times are to be chosen while the run is computed.
 
     Parameters
     ----------

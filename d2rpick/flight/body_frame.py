@@ -20,7 +20,7 @@ Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
 # The orientation of a body with a larger deviation cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Smallest mass of connected parts that define the frame of a body, as a fraction of the mass of the body [-].
+# Smallest mass fraction of the connected parts that define the frame of a body [-].
 _MOST: Final = 0.5
 # Largest ratio of one moment of inertia to the others at which points are treated as lying on a line [-].
 _ALONG_LINE: Final = 1e-9
@@ -29,7 +29,7 @@ _MOST_NODES: Final = 50
 
 
 class Frame(NamedTuple):
-    """Orientation of a body: ``axes`` (n, 3, 3) rotate directions of the deck to those at each time.
+    """Orientation of a body: ``axes`` (n, 3, 3) rotate directions in the deck to the directions at each time.
 
     ``doubt`` is the angle by which bending of the body turns its frame from one time to another [rad].
     """

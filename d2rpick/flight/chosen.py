@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
-# Smallest number of extrema of an energy that vibrates about a level; with fewer, the energy must be constant.
+# Smallest number of extrema of an energy that may vibrate about a level; with fewer, it must be constant.
 _LEAST_TURNS: Final = 4
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 # _GRAVITY: gravity in m, inches and feet per second squared; in other units, it differs by a power of 10.
-# _ALIKE: largest relative deviation of an acceleration that is treated as gravity [-]; 1 load in 200 is so close.
+# _ALIKE: largest relative deviation of an acceleration that is treated as gravity [-]; 1 load in 200 lies within it.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 # Ratio of the rounding error of the fitted momentum change to the rounding error of the momentum itself [-].

@@ -44,13 +44,13 @@ _KNOWN, _TURNED = 3 / 4, 4
 # Largest energy that is treated as round-off, relative to the largest energy [-]; files have about seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# Widening of the energy band of the last quarter of a flight that contains all its energies, in band widths [-].
+# Widening of the energy band of a flight's last quarter such that it contains all its energies, in band widths [-].
 _RESERVE: Final = 0.5
 # Largest difference of the mean energies in the last two quarters of a flight, as a fraction of the energy band [-].
 # A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
 # A steady drift changes the mean energies of the two quarters by the width of the energy band.
 _DRIFT: Final = 0.35
-# Smallest number of swings over half of its range in a slow vibration; a crash has fewer swings.
+# Smallest number of oscillations over half of its range in a slow vibration; a crash has fewer.
 _SWINGS: Final = 4
 # Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75

@@ -329,7 +329,7 @@ def select_momenta_of_flight(
 
 
 def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
-    """Return the unit vector (3,) of gravity in a flight or, without gravity, that of the motion.
+    """Return the unit vector (3,) of gravity in a flight or, without gravity, of the motion.
 
     None if the momentum is not written, or nothing moves.
     """

@@ -54,7 +54,7 @@ _HELD = 0.01
 # Largest relative difference between the summed part momenta and the momentum of the model, if no part is missing [-].
 _ALL_OF_IT: Final = 1e-2
 # _BY_ITSELF: smallest duration of a separate flight of a body that is considered, as a fraction of the record [-].
-# _OF_ITS_OWN: smallest relative difference of its velocity from that of the others of a body that flies separately [-].
+# _OF_ITS_OWN: smallest relative velocity difference between a body that flies separately and the other parts [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"

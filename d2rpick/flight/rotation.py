@@ -40,7 +40,7 @@ _TRIED: Final = 2
 _MORE_RIGID: Final = 0.5
 # Largest unexplained sum of m r^2 that is ignored, as a fraction of the sum of m r^2 [-].
 _NOTHING: Final = 1e-6
-# Largest motion of the other parts in a rotation that is ignored, as a fraction of the moving part's motion [-].
+# Largest motion of the other parts in a rotation that is ignored, relative to the moving part's motion [-].
 _NOTABLE_WAY: Final = 0.1
 # Largest mass fraction of a single part at which the rotation of the body can be determined [-].
 _MOST_OF_BODY: Final = 0.95

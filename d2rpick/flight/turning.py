@@ -255,7 +255,7 @@ def _solve_turning(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of the rotation error psi: return propagation matrix, particular solution, effect of I(tr)."""
+    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = (
         np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))

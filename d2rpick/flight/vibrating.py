@@ -56,7 +56,7 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
 def extract_kinetic_energy(
     history: History, flight: Flight
 ) -> tuple[Samples, Samples] | None:
-    """Return the kinetic energy of all parts that vibrate together in the flight, without that of their fall.
+    """Return the kinetic energy of all parts that vibrate together in the flight, without the energy of their fall.
 
     Parameters
     ----------

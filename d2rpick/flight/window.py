@@ -24,7 +24,7 @@ TOLERANCE = 1e-3
 # _STAYS: smallest fraction of its length that a window retains if it is treated as unchanged [-].
 # _STANDS: largest shift of the other end of a window that shrinks at one end only, as a fraction of its length [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# Smallest misfit of a vibration in the middle half of a window, as a fraction of that in the whole window [-].
+# Smallest misfit of a vibration in the middle half of a window, as a fraction of the misfit in the whole window [-].
 # For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.
 _RINGS = 1 / 3
 # SHORTEST: smallest duration of a flight, as a fraction of the record [-].

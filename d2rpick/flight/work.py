@@ -36,7 +36,7 @@ _SLOW: Final = 1e-2
 _MASS_ERROR: Final = 2.0
 # Largest deviation that shows no work, as a fraction of the range of the internal energy [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number [-].
+# Error of a sum of energies minus the work of gravity, in multiples of the relative rounding error of a number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
 # _LITTLE: largest relative loss of kinetic energy that is ignored [-].

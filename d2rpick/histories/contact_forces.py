@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Forces and impulse changes below this fraction of their largest value are treated as zero [-].
-# Single precision has seven digits, so forces below this limit are rounding errors.
+# Largest force or impulse change that is treated as zero, as a fraction of the largest value [-].
+# Single precision has seven digits, so forces below this fraction are rounding errors.
 _NOTHING: Final = 1e-6
 
 

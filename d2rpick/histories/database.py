@@ -498,7 +498,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of some of the other times, and the indices of the latter.
+    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
 
     Examples
     --------

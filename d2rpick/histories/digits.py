@@ -35,7 +35,7 @@ _TYPED_TIME: Final = (
 _NEVER_MEANT: Final = 0.01
 # Smallest value of a time converted to a smaller unit that is suggested, as a fraction of the record [-].
 _HARDLY_MEANT: Final = 0.05
-# A td among this number of first states is assumed to be in another unit, because it would hardly save time.
+# Number of first states at which a td is assumed to be in another unit, because it would hardly save time.
 # Only in a record of 1000 or more states can both a td and 1000 times this td be times of the record.
 _FIRST_STATES: Final = 10
 
@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return the question whether an argument was meant in another unit, with the values in that of the record."""
+    """Return the question whether an argument was meant in another unit, with the converted values."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

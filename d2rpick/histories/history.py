@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of those parts with these indices that move [mass]; NaN if one of the masses is unknown."""
+        """Return the mass of the moving parts among the parts with these indices [mass]; NaN if a mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]

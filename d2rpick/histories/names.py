@@ -42,7 +42,7 @@ INTERNAL_ENERGY: Final = frozenset(
 
 # Normalised names of other quantities of the whole model: energies, momentum, velocity and mass.
 # The names of quantities come from LS-DYNA, Radioss, Abaqus, Exodus, lasso-python and several languages.
-# In Abaqus, the internal energy contains the artificial energy; other solvers keep hourglass energy separate.
+# In Abaqus, the internal energy contains the artificial energy; other solvers list the hourglass energy separately.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
         {"kineticenergy", "energykinetic", "kinetic", "ke", "allke", "kinen", "kinenergy", "energykin", "kine", "ekin",

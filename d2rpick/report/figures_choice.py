@@ -82,7 +82,7 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # Hatches distinguish the windows in print without colours.
+}  # Hatches distinguish the windows in black-and-white print.
 # _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
 # _PLAN_PANEL: height of the axes in the figure of a plan on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8

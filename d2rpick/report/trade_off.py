@@ -194,7 +194,7 @@ def _list_choice_if_td_is_free(
 
 
 def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Describe the drawback of a pair with a smaller error, and that of a pair with a longer rigid time."""
+    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time."""
     best = trade_off.recommended
     if best is None:
         return []

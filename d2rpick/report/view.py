@@ -157,7 +157,7 @@ def make_view(
 def _read_flight_energies(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
-    """Return the energies in the flight except near its ends, or those of adjacent states if the flight has none."""
+    """Return the energies in the flight except near its ends, or of adjacent states if the flight has none."""
     margin = _UNSURE * (end - start)
     flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))

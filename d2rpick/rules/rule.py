@@ -148,7 +148,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return engine files, keyed by file name, for engine runs given by end time and ON, OFF or nothing for /RBODY."""
+    """Return engine files, keyed by file name, for given end times and /RBODY cards (ON, OFF or none)."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""

@@ -21,9 +21,10 @@ from d2rpick.rules.rule import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import CardField
+    from d2rpick.deck.ls_dyna_parts import Constraint
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
 _NEAREST = 3  # Largest number of part ids that a message suggests for an unknown id.
@@ -368,6 +369,8 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
         if (constraint.kind == "nodal rigid body") == nodal
     ]
     owner = _find_owners(case, switched) if constraints else {}
+    parts_of_nodes = _find_parts_of_nodes(case, constraints) if nodal else {}
+    parts_made_rigid = {event.unit.id for event in case.made_rigid}
     for constraint in constraints:
         part_of_nodes = (
             owner[node] for node in sorted(constraint.nodes) if node in owner
@@ -383,8 +386,36 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
             name = constraint.kind
         flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
         problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
-        cure = "set the flag to 1 there and to 2 on the card that switches back"
+        held_parts = _find_held_parts(constraint, parts_of_nodes)
+        if unswitched_parts := held_parts - parts_made_rigid:
+            held = f"it also holds {name_units(unswitched_parts)}, so do not delete it"
+            cure = f"{held} (D2R120): make all its parts rigid, or none of them"
+        else:
+            cure = "set the flag to 1 there and to 2 on the card that switches back"
         yield constraint.place, f"{problem}, so it stays active; {cure}"
+
+
+def _find_parts_of_nodes(
+    case: Case, constraints: Sequence[Constraint]
+) -> dict[int, set[int]]:
+    """Return, by node id, all parts whose elements contain a node of the constraints."""
+    cards = find_element_cards(case.deck, searched=True) if constraints else ()
+    if not cards:
+        return {}
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+
+    nodes = frozenset[int]().union(*(constraint.nodes for constraint in constraints))
+    return find_parts_of_nodes(cards, nodes)
+
+
+def _find_held_parts(
+    constraint: Constraint, parts_of_nodes: Mapping[int, Collection[int]]
+) -> set[int]:
+    """Return the parts that contain a node of a constraint."""
+    return set[int]().union(
+        *(parts_of_nodes.get(node, ()) for node in constraint.nodes)
+    )
 
 
 def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
@@ -595,17 +626,10 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
         for constraint in (case.constraints if deleting else ())
         if constraint.kind == "nodal rigid body"
     ]
-    cards = find_element_cards(case.deck, searched=True) if joining else ()
-    if not cards:
-        return
-    # Imported here to keep start-up fast.
-    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
-
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
-    joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))
-    owners = find_parts_of_nodes(cards, joined_nodes)
+    parts_of_nodes = _find_parts_of_nodes(case, joining)
     for constraint in joining:
-        parts = set[int]().union(*(owners.get(node, ()) for node in constraint.nodes))
+        parts = _find_held_parts(constraint, parts_of_nodes)
         switched = parts & bodies.keys()
         if not switched or len({bodies.get(part) for part in parts}) == 1:
             continue

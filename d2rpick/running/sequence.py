@@ -25,7 +25,7 @@ RIGID_KINDS: Final = (PROBE, RIGID)
 # Largest difference of times that are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# Number of remaining engine run numbers at which no further flight is switched, so that the run can reach its end.
+# Number of remaining engine-run numbers at which no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
 # Shortest deformable engine run in a flight, as a fraction of the force-free time that shows a flight [-].
 _LEAST: Final = 0.25

@@ -198,7 +198,7 @@ class GrowingWitness:
         self._examined_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
-        """Add a flight since ``first`` that is seen at a state; if ``gravity`` is None, only schedule the next test."""
+        """Record a flight since ``first`` that is detected now; without ``gravity``, only schedule a new test."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _MOST: Final = 20_000
 # Largest growth factor of the number of td judged together, from one batch to the next [-].
 _MORE: Final = 8
-# A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
+# Largest excess of the upper bound of a residual over the residual without a note on the candidate [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"

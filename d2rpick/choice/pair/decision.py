@@ -37,7 +37,7 @@ _USE_BEST: Final = (
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
 # _USE_COMPARED: advice of _USE_BEST if the comparison has been made.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
-# Largest difference between the worst-case and the expected residual at which the worst case is not shown [-].
+# Largest excess of the worst-case residual over the expected residual at which no worst case is shown [-].
 _ALIKE: Final = 5e-3
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.situation import Situation
+    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
 # Largest excess over the smallest deformation error at which deformation errors are treated as equal [-].
@@ -263,6 +264,10 @@ _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
 )
+_CHECK_GIVEN_TIMES: Final = (
+    "make sure that no force acts in the flight that you gave, "
+    "or let the evidence decide, without `after` and `landing`"
+)
 _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
@@ -331,10 +336,21 @@ class Quality(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
+def _explain_uncertain_flight(flight: Flight) -> Cause:
+    """Return why a flight is not certain: what contradicts the times given by the user, or a lack of evidence."""
+    if flight.source == "given" and flight.doubts:
+        return Cause(
+            flight.doubts[-1],
+            _CHECK_GIVEN_TIMES,
+            kind="the evidence contradicts the flight that was given",
+        )
+    return _NOT_CERTAIN
+
+
 def grade_pair(situation: Situation, best: Candidate) -> Quality:
     """Grade a recommended tr by the motion after td and by its vibration error, also relative to the next contact."""
     flight = situation.flight
-    uncertain = () if flight.certain else (_NOT_CERTAIN,)
+    uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
         *(Cause(fault, _CHOOSE_TIMES_IN_FLIGHT) for fault in outside),

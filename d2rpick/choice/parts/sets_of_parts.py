@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Savings that differ by less than this are treated as equal [-]; the cost model has errors of a few percent.
+# Largest difference of savings that are treated as equal [-]; the cost model has errors of a few percent.
 _LIKE: Final = 0.01
 # Smallest fraction of the mass of all switchable parts that the set "heavy" contains [-].
 _HEAVY: Final = 0.5

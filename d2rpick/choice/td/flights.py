@@ -145,7 +145,7 @@ def _add_given_start(
 def _insert_flight(
     history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
-    """Return flights in ascending order, after replacing those that overlap the given flight by it."""
+    """Return flights in ascending order; the given flight replaces the flights that it overlaps."""
     first, last = given_flight.within(history.time)
     windows = ((flight, *flight.within(history.time)) for flight in flights)
     kept_flights = [

@@ -407,7 +407,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr, among those that are long enough to be planned if there are any."""
+    """Return the pairs with the most certain tr, only from those long enough to be planned if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -430,7 +430,7 @@ def _rate_tr_at(situation: Situation) -> int:
 def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return, for many modes, the td of a long window with a small residual, and that of the longest acceptable window.
+    """Return, for many modes, the td of a long window with a small residual, and the td of the longest acceptable one.
 
     The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
     more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good

@@ -70,7 +70,7 @@ def _read_start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Return True if the layout of the last state of this branch in a file differs from that of the previous state."""
+    """Return True if the last state of this branch in a file has another layout than the previous state."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 

@@ -69,7 +69,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State of the reader of a text of curves: the curves read so far, and the label of their x axis."""
+    """State of the reader: the curves that it has read so far, and the label of their x axis."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text

@@ -34,7 +34,7 @@ _ERF_BLOCK: Final = "/erfblock"
 # Largest number of columns of a table without column names that is still read.
 _WIDEST: Final = 64
 
-# A dataset of at most this fraction of the file is copied, because a view would keep the whole file in memory [-].
+# Largest dataset that is copied, as a fraction of the file [-]; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 

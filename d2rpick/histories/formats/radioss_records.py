@@ -103,7 +103,7 @@ class Records:
         return (count + 2) * WIDTH
 
     def place(self, number: int) -> int:
-        """Return the offset in its record of a real with the given number, counted from 0 [bytes]."""
+        """Return the offset of a real in its record [bytes]; reals are counted from 0."""
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
