@@ -213,8 +213,9 @@ def find_constants(sources: Mapping[str, Source]) -> list[Constant]:
 def _is_number(value: object) -> bool:
     if isinstance(value, tuple) and value:
         return all(_is_number(element) for element in value)
-    is_numeric = isinstance(value, float | int) and not isinstance(value, bool)
-    return is_numeric and value != 0 and isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, float | int):
+        return False
+    return value != 0 and isfinite(value)
 
 
 def find_uses(sources: Mapping[str, Source], constant: Constant) -> Uses:
