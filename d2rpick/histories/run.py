@@ -57,7 +57,8 @@ class OpenedRun:
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
-    ``notes`` are on files that were not used; ``forces`` are those of files with forces only.
+    ``notes`` are on files that were not used; ``forces`` are those of files with forces only, and ``nodes`` are files
+    with the motion of nodes only.
     """
 
     def __init__(
@@ -68,11 +69,13 @@ class OpenedRun:
         surroundings: Surroundings = UNKNOWN,
         notes: tuple[str, ...] = (),
         forces: tuple[ContactForce, ...] = (),
+        nodes: tuple[Source, ...] = (),
         reopen: Callable[[Surroundings], OpenedRun] | None = None,
     ) -> None:
         self.sources, self.databases, self.files = sources, databases, files
         self.surroundings = surroundings
         self._notes, self._forces, self._reopen = notes, forces, reopen
+        self._nodes = nodes
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._reopen is None:
@@ -90,6 +93,7 @@ class OpenedRun:
             surroundings,
             self._notes,
             self._forces,
+            self._nodes,
             self._reopen,
         )
 
@@ -265,12 +269,16 @@ class OpenedRun:
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
         """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
+        wanted = set(ids)
         for database in self.databases:
-            written = [id_ for id_ in database.node_ids if id_ in ids]
-            if written:
-                values = database.node_displacements(written)
-                return NodeMotion(database.time, tuple(written), values)
-        return None
+            motion = give_if_written(partial(_read_displacements, database, wanted))
+            if motion:
+                return motion
+        if not self._nodes:
+            return None
+        from d2rpick.histories.node_listings import read_listed_nodes
+
+        return give_if_written(partial(read_listed_nodes, self._nodes, wanted))
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the total momentum of given parts, or of the whole model; None if it is not written."""
@@ -484,6 +492,14 @@ class OpenedRun:
             complete=all(legs.complete for legs in self.databases),
             notes=(*self.notes, *notes),
         )
+
+
+def _read_displacements(database: Legs, wanted: set[int]) -> NodeMotion | None:
+    """Return the displacements of the wanted nodes that a database contains; None if it contains no such node."""
+    ids = tuple(id_ for id_ in database.node_ids if id_ in wanted)
+    if not ids:
+        return None
+    return NodeMotion(database.node_time, ids, database.node_displacements(ids))
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
