@@ -251,7 +251,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor. It uses the history instead.",
+            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor, and uses the history instead. Or "
+            "the deck already contains switching cards, which the answer does not consider.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
