@@ -387,21 +387,14 @@ def _limit_to_undriven(
 
     Opposite forces, and weak ones, drive the model although its momentum hardly shows them.
     """
-    from d2rpick.flight.work import find_undriven_window
+    from d2rpick.flight.work import limit_to_undriven
 
     if not _explain_why_driven(history, "momentum", flight):
         return flight
     assert history.balance
-    undriven = find_undriven_window(history.balance, flight.start, flight.end, td)
-    if undriven is None:
+    limited = limit_to_undriven(history.balance, flight, td)
+    if limited is None or limited.end - limited.start < SHORTEST * history.duration:
         return None
-    start = max(flight.start, undriven[0])
-    end = min(flight.end, undriven[1])
-    if end - start < SHORTEST * history.duration:
-        return None
-    limited = flight._replace(
-        start=start, end=end, end_seen=flight.end_seen or end < flight.end
-    )
     return None if _explain_why_driven(history, "momentum", limited) else limited
 
 

@@ -73,25 +73,25 @@ def compute_work_beyond_gravity(
     return law.misfit(inside.start, inside.stop - 1)
 
 
-def find_undriven_window(
-    balance: Balance, start: float, end: float, td: float
-) -> tuple[float, float] | None:
-    """Return the part of a window around ``td`` in which gravity and damping explain the external work [time].
+def limit_to_undriven(
+    balance: Balance, flight: FreeFlight, td: float
+) -> FreeFlight | None:
+    """Return the part of a flight around ``td`` [time] in which gravity and damping explain the external work.
 
     A couple of opposite forces drives a model and leaves its momentum alone, and so does nearly a weak load.  None if
     the work is not written, or if a load does work at td.
     """
-    inside = find_window(balance.time, start, end)
-    at = int(np.searchsorted(balance.time, td))
+    time = balance.time
+    inside = find_window(time, flight.start, flight.end)
+    at = int(np.searchsorted(time, td))
     if balance.external_work is None or not inside.start <= at < inside.stop:
         return None
     law = _make_law_of_external_work(balance)
     first, last = find_longest_window(law, at, 0.0)
-    first = max(first, inside.start)
-    last = min(last, inside.stop - 1)
-    if last - first + 1 < FEWEST_STATES:
-        return None
-    return float(balance.time[first]), float(balance.time[last])
+    start = max(flight.start, float(time[first]))
+    end = min(flight.end, float(time[last]))
+    end_seen = flight.end_seen or end < flight.end
+    return flight._replace(start=start, end=end, end_seen=end_seen)
 
 
 @remember

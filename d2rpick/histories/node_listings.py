@@ -1,4 +1,4 @@
-"""Read LS-DYNA's ASCII database nodout, which contains the motion of nodes.
+"""Find the motion of nodes in a run, and read LS-DYNA's ASCII database nodout, which contains it.
 
 A state begins with ``n o d a l   p r i n t   o u t   f o r   t i m e  s t e p`` and its time. A line is the number of a
 node and its displacements, velocities, accelerations and coordinates; rotations follow in a block of their own. A state
@@ -8,17 +8,19 @@ that is cut at the end of the file is left out, for instance in a run that is st
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import FormatError, give_if_written
 from d2rpick.histories.history import NodeMotion
 from d2rpick.histories.samples import find_newest_states
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
+    from d2rpick.histories.database import Legs
     from d2rpick.histories.source import Source
 
 _STATE: Final = rb"(?m)^ *n o d a l   p r i n t   o u t   f o r   t i m e  s t e p"
@@ -32,6 +34,30 @@ _LINE: Final = rb"(?m)^ *(\d+) +" + rb" *".join([_NUMBER] * 3) + rb"(?=[-+ \r\n]
 def recognises(head: bytes) -> bool:
     """Return True if a file with these first bytes is a nodout with displacements; never raises."""
     return re.search(_STATE, head) is not None and re.search(_COLUMNS, head) is not None
+
+
+def find_motion(
+    databases: Sequence[Legs], listings: Sequence[Source], wanted: set[int]
+) -> NodeMotion | None:
+    """Return the motion of those wanted nodes that the first source with such nodes contains.
+
+    None if neither the databases of a run nor its listings of nodes contain them, or if their records are damaged.
+    """
+    for database in databases:
+        motion = give_if_written(partial(_read_database, database, wanted))
+        if motion:
+            return motion
+    if not listings:
+        return None
+    return give_if_written(partial(read_listed_nodes, listings, wanted))
+
+
+def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
+    """Return the motion of the wanted nodes that a database contains; None if it contains no such node."""
+    ids = tuple(id_ for id_ in database.node_ids if id_ in wanted)
+    if not ids:
+        return None
+    return NodeMotion(database.node_time, ids, database.node_displacements(ids))
 
 
 def read_listed_nodes(

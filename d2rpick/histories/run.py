@@ -269,16 +269,10 @@ class OpenedRun:
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
         """Return the displacements of those requested nodes that the files contain; None if they contain none."""
-        wanted = set(ids)
-        for database in self.databases:
-            motion = give_if_written(partial(_read_displacements, database, wanted))
-            if motion:
-                return motion
-        if not self._nodes:
-            return None
-        from d2rpick.histories.node_listings import read_listed_nodes
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.node_listings import find_motion
 
-        return give_if_written(partial(read_listed_nodes, self._nodes, wanted))
+        return find_motion(self.databases, self._nodes, set(ids))
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the total momentum of given parts, or of the whole model; None if the files do not contain it."""
@@ -492,14 +486,6 @@ class OpenedRun:
             complete=all(legs.complete for legs in self.databases),
             notes=(*self.notes, *notes),
         )
-
-
-def _read_displacements(database: Legs, wanted: set[int]) -> NodeMotion | None:
-    """Return the displacements of the wanted nodes that a database contains; None if it contains no such node."""
-    ids = tuple(id_ for id_ in database.node_ids if id_ in wanted)
-    if not ids:
-        return None
-    return NodeMotion(database.node_time, ids, database.node_displacements(ids))
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
