@@ -40,7 +40,10 @@ _TEXTS: Final = {
 
 
 class MadeRun(NamedTuple):
-    """Run: times (n,), internal and kinetic energy of the part that vibrates, energy of another part, and td."""
+    """Run: times (n,), internal and kinetic energy of the part that vibrates, energy of another part, and td.
+
+    ``states_per_period`` counts the states in a period of the energy of the fastest mode.
+    """
 
     time: Samples
     internal: Samples
@@ -49,6 +52,7 @@ class MadeRun(NamedTuple):
     load_end: float
     landing: float
     td: float
+    states_per_period: float
 
 
 class Asked(NamedTuple):
@@ -69,7 +73,8 @@ class Relation(NamedTuple):
     too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` evidence than the
     first, equally good pairs may change places: states that are left out and the band of a second energy decide among
     them.  The second answer then either has the same tr, or a tr that the first answer lists as well and whose residual
-    is that of its chosen tr within the stated ``+-``.
+    is that of its chosen tr within the stated ``+-``.  The first history has at least ``fewest_states`` in a period of
+    the energy of its fastest mode.
     """
 
     change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
@@ -78,6 +83,7 @@ class Relation(NamedTuple):
     shift: float = 0.0
     may_lose: bool = False
     shows_other: bool = False
+    fewest_states: float = 0.0
 
 
 class Chosen(NamedTuple):
@@ -95,7 +101,15 @@ class Chosen(NamedTuple):
     as_good: tuple[float, ...] = ()
 
 
-def make_run(random: Random) -> MadeRun:
+def make_run(random: Random, fewest_states: float = 0.0) -> MadeRun:
+    """Draw runs until one has at least ``fewest_states`` in a period of the energy of its fastest mode."""
+    run = _draw_run(random)
+    while run.states_per_period < fewest_states:
+        run = _draw_run(random)
+    return run
+
+
+def _draw_run(random: Random) -> MadeRun:
     """Draw a run with random vibration, load and sampling; the energy has two periods per vibration period."""
     mode_count = random.choice((1, 1, 2))
     period = 10 ** random.uniform(-3, 0)
@@ -107,17 +121,13 @@ def make_run(random: Random) -> MadeRun:
     energy = 10 ** random.uniform(-2, 6)
     damping = random.uniform(0.0, 0.6) / flight
     internal, kinetic = np.zeros_like(time), np.zeros_like(time)
+    fastest = 0.0
     for mode in range(mode_count):
         size = energy * (1.0 if mode == 0 else random.uniform(0.02, 0.3))
         phase = random.uniform(0, 2 * math.pi)
-        angle = (
-            2
-            * math.pi
-            / period
-            * (1.0 if mode == 0 else random.uniform(1.3, 3.5))
-            * (time - load)
-            + phase
-        )
+        rate = 2 * math.pi / period * (1.0 if mode == 0 else random.uniform(1.3, 3.5))
+        fastest = max(fastest, rate)
+        angle = rate * (time - load) + phase
         envelope = size * np.exp(-damping * np.maximum(time - load, 0.0))
         internal += envelope * np.sin(angle) ** 2
         kinetic += envelope * np.cos(angle) ** 2
@@ -134,6 +144,7 @@ def make_run(random: Random) -> MadeRun:
         load,
         landing,
         load + random.uniform(0.5, 0.95) * flight,
+        math.pi / (fastest * step),
     )
 
 
@@ -429,8 +440,13 @@ RELATIONS: Final[Mapping[str, Relation]] = {
     "doubled last state": Relation(doubled_last_state),
     "cut after the landing": Relation(cut_after_the_landing),
     "order of legs": Relation(legs_in_another_order),
+    # With fewer than two states per period (the sampling theorem), a record is that of another, slower vibration.
     "every second state": Relation(
-        every_second_state, exact=False, may_lose=True, shows_other=True
+        every_second_state,
+        exact=False,
+        may_lose=True,
+        shows_other=True,
+        fewest_states=4.0,
     ),
     "other names": Relation(other_names),
     "other signs": Relation(other_signs),
@@ -515,7 +531,8 @@ def check_relation(name: str, random: Random) -> bool:
 
     Raises AssertionError if the second answer does not follow.
     """
-    relation, run = RELATIONS[name], make_run(random)
+    relation = RELATIONS[name]
+    run = make_run(random, relation.fewest_states)
     with TemporaryDirectory() as folder:
         first, second = (
             choose(question) for question in relation.change(run, Path(folder), random)
