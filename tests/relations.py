@@ -70,7 +70,8 @@ class Relation(NamedTuple):
 
     Times of the second answer are ``scale`` times those of the first, and later by ``shift`` record lengths.  If it is
     ``exact``, everything must be equal except for rounding.  If it ``may_lose`` information, the second history may be
-    too coarse to choose from, or to choose on the same basis.  If the second history ``shows_other`` evidence than the
+    too coarse to choose from, or to choose on the same basis, and a tr before the first state that is left in the
+    flight may give way to another tr of the first answer.  If the second history ``shows_other`` evidence than the
     first, equally good pairs may change places: states that are left out and the band of a second energy decide among
     them.  The second answer then either has the same tr, or a tr that the first answer lists as well and whose residual
     is that of its chosen tr within the stated ``+-``.  The first history has at least ``fewest_states`` in a period of
@@ -89,7 +90,8 @@ class Relation(NamedTuple):
 class Chosen(NamedTuple):
     """Values of an answer that are compared; None if unknown.
 
-    ``as_good`` are the tr whose residual is that of the chosen one within the ``+-`` of both.
+    ``listed`` are all tr of the answer, ``as_good`` those whose residual is that of the chosen one within the ``+-`` of
+    both.
     """
 
     tr: float | None
@@ -99,6 +101,11 @@ class Chosen(NamedTuple):
     grade: str
     basis: str
     as_good: tuple[float, ...] = ()
+    listed: tuple[float, ...] = ()
+
+    def lists(self, tr: float, room: float) -> bool:
+        """Return True if a tr of the answer is this one within ``room`` [time]."""
+        return any(abs(tr - other) <= room for other in self.listed)
 
 
 def make_run(random: Random, fewest_states: float = 0.0) -> MadeRun:
@@ -488,6 +495,7 @@ def choose(question: Asked) -> Chosen:
         grade,
         answer.basis,
         as_good,
+        tuple(candidate.tr for candidate in answer.candidates),
     )
 
 
@@ -513,8 +521,12 @@ def find_difference(
             else relation.scale * first.half_width + second.half_width
         )
         room = stated + _ROUNDED * span
-        is_listed = any(abs(second.tr - tr) <= room for tr in first.as_good)
-        is_alike = relation.shows_other and is_listed
+        if _has_lost_first_state(relation, run, first) and not second.lists(
+            moved, room
+        ):
+            return "" if first.lists(second.tr, room) else f"tr {second.tr:.9g} is new"
+        is_as_good = any(abs(second.tr - tr) <= room for tr in first.as_good)
+        is_alike = relation.shows_other and is_as_good
         if abs(second.tr - moved) > room and not is_alike:
             return f"tr {moved:.9g} became {second.tr:.9g}, stated to {stated:.2g}"
     if first.residual is not None and second.residual is not None:
@@ -524,6 +536,13 @@ def find_difference(
     if relation.exact and (first.grade, first.basis) != (second.grade, second.basis):
         return f"{first.grade} by {first.basis} became {second.grade} by {second.basis}"
     return ""
+
+
+def _has_lost_first_state(relation: Relation, run: MadeRun, first: Chosen) -> bool:
+    """Return True if tr is so near the end of the load that no state before it may be left in the flight."""
+    if not relation.may_lose or first.tr is None:
+        return False
+    return first.tr - run.load_end < 2 * float(run.time[1] - run.time[0])
 
 
 def check_relation(name: str, random: Random) -> bool:
