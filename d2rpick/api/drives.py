@@ -82,9 +82,8 @@ class Driving:
             deck, parse_id_ranges("--part", part) if part else ()
         )
         self.inventory = read_inventory(deck)
-        deck_wait = wait_of_deck(self.inventory)
         if wait is not None:
-            check_wait(wait, deck_wait, deck)
+            check_wait(wait, wait_of_deck(self.inventory), deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         share = CostModel(self.inventory).saved(self.deck.parts).value
         self.limits = Limits(
@@ -95,7 +94,7 @@ class Driving:
             _UNKNOWN if share is None else 1 - share,
         )
         check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
-        self.observer = Observer(self.deck.parts, self.inventory, wait, deck_wait)
+        self.observer = Observer(self.deck.parts, self.inventory, wait)
         self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(
             warn_about_solver(self.deck.parts, self.inventory)

@@ -17,7 +17,6 @@ from d2rpick.base.files import (
     write_as_a_whole,
 )
 from d2rpick.histories.names import Selection
-from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     Leg,
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.engine import Commands, Solver
-    from d2rpick.running.inner_motion import Wait
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
@@ -286,25 +284,16 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
 
 
 class Observer:
-    """Reads the histories of legs for some ``parts`` of a deck.
-
-    ``wait`` is the wait that the user gave, ``of_deck`` the wait that follows from the deck.
-    """
+    """Reads the histories of legs for some ``parts`` of a deck; ``wait`` is the wait that the user gave."""
 
     def __init__(
-        self,
-        parts: Sequence[int],
-        inventory: Inventory,
-        wait: float | None = None,
-        of_deck: Wait | None = None,
+        self, parts: Sequence[int], inventory: Inventory, wait: float | None = None
     ) -> None:
-        springs = sorted(inventory.springs)
         selection = Selection(
-            parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
+            parts=tuple(map(str, parts)),
+            springs=tuple(map(str, sorted(inventory.springs))),
         )
-        self._looks = Looks(selection, inventory)
-        self._waits = (wait, of_deck)
-        self._evidence = GrowingEvidence(*self._waits)
+        self._looks = Looks(selection, inventory, wait)
 
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
@@ -314,30 +303,22 @@ class Observer:
         ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
         the record shows a longer one, which ``why`` then says.
         """
-        names = [str(path) for path in histories]
-        states, follows = self._looks.new_states(names)
-        if not follows:
-            self._evidence = GrowingEvidence(*self._waits, wait_before)
-        if states.time.size:
-            self._evidence.take(states)
-        history = self._evidence.history
+        self._looks.look([*map(str, histories)], wait_before)
+        evidence = self._looks.evidence
         if order.rigid:
-            return LegFindings(contact=self._evidence.find_contact())
-        return self._find_flight(order, history)
-
-    def _find_flight(self, order: Order, history: History) -> LegFindings:
-        """Return the findings of a deformable leg."""
+            return LegFindings(contact=evidence.find_contact())
+        history = evidence.history
         now = float(history.time[-1])
-        flights = self._evidence.flights()
-        free = self._evidence.free_since(now)
-        wait = self._evidence.motion.wait(free, now)
+        flights = evidence.flights()
+        free = evidence.free_since(now)
+        wait = evidence.find_wait(free, now)
         flies = bool(flights) and flights[-1].end is None
         tr = _choose_end(order, history, free)
         swing = find_swing(history, free, tr) if flies else None
         # These flights were slightly too short to be switched.
         short_flights = tuple(
             (start, end)
-            for start, end in self._evidence.pauses(order.start)
+            for start, end in evidence.pauses(order.start)
             if wait is not None
             and end - start >= _REPORTED * wait.time
             and start >= order.switch_after
@@ -350,7 +331,7 @@ class Observer:
             tr=tr,
             idle=wait is not None and wait.source == "at-rest",
             short=short_flights,
-            swing=self._evidence.motion.longest_swing(now),
+            swing=evidence.motion.longest_swing(now),
             steady_from=swing.flight if swing else 0.0,
             swing_warning=swing.told if swing else "",
         )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.window import FEWEST
-from d2rpick.running.evidence import GrowingEvidence, highest_energy
 from d2rpick.running.inner_motion import check_wait
 from d2rpick.running.swing import find_swing
 
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.history import History
+    from d2rpick.running.evidence import GrowingEvidence
     from d2rpick.running.witness import Quiet
 
     # Events of past flights, keyed by the start of the flight and the time at which it was seen.
@@ -163,6 +163,12 @@ def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
             f"{_warn_of_swing(history, flight, tr)}"
         )
         yield _advise(tr, float(later_times[0]), message, flight)
+
+
+def highest_energy(history: History, start: float, end: float) -> float:
+    """Return the last time from ``start`` to ``end`` at which the internal energy has its maximum [time]."""
+    time, energy = history.between(start, end)
+    return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
 def _advise(tr: float, seen: float, message: str, flight: Quiet) -> Event:

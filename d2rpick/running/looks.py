@@ -12,7 +12,9 @@ from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.opening import Source, open_sources
 from d2rpick.histories.source import open_files, open_source
-from d2rpick.running.record import find_last_states, hold_back_states, skip_states
+from d2rpick.running.evidence import GrowingEvidence
+from d2rpick.running.inner_motion import wait_of_deck
+from d2rpick.running.record import GrowingRecord
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,20 +24,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.resuming import ResumePoint
     from d2rpick.histories.run import OpenedRun
-    from d2rpick.running.record import Table
 
 # A record with fewer states than this is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
 class Looks:
-    """Reads the same run repeatedly, with the same ``selection`` and deck."""
+    """Reads the same run repeatedly, with the same ``selection`` and deck, and keeps the ``evidence`` of its flights.
+
+    ``wait`` is the waiting time that the user gave [time].
+    """
 
     def __init__(
-        self, selection: Selection, inventory: Inventory | None = None
+        self,
+        selection: Selection,
+        inventory: Inventory | None = None,
+        wait: float | None = None,
     ) -> None:
         self._selection, self._inventory = selection, inventory
-        self._last_states: list[Table] = []
+        self._waits = (wait, wait_of_deck(inventory) if inventory else None)
+        self.evidence = GrowingEvidence(*self._waits)
+        self.record = GrowingRecord()
         # For each file, where the next read continues, and all files of the last read.
         self._resume_points: dict[str, ResumePoint] = {}
         self._names: frozenset[str] = frozenset()
@@ -44,6 +53,20 @@ class Looks:
     def grow(self) -> bool:
         """Return True if the next read covers only the last states."""
         return bool(self._resume_points)
+
+    def look(
+        self, names: Sequence[str], wait_before: float = 0.0
+    ) -> tuple[History, bool]:
+        """Add the new states to the evidence, or begin with new evidence; results and errors as `new_states`.
+
+        ``wait_before`` is the waiting time of earlier flights [time].
+        """
+        states, follows = self.new_states(names)
+        if not follows:
+            self.evidence = GrowingEvidence(*self._waits, wait_before)
+        if states.time.size and self.record.history:
+            self.evidence.take(states, self.record.history)
+        return states, follows
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
         """Read the new states, and report whether they follow those read before.
@@ -59,17 +82,18 @@ class Looks:
         """
         if not self._names <= {*names}:
             # A file no longer exists, so all files are read from their start.
-            self._resume_points, self._last_states = {}, []
-        history = self._read_on(names)
-        new_states = history and skip_states(history, self._last_states)
-        follows = True
+            self._resume_points, self.record = {}, GrowingRecord()
+        follows = self.record.history is not None
+        states = self._read_on(names)
+        new_states = states and self.record.extend(states)
         if new_states is None:
             whole = self._read_whole(names)
-            new_states = skip_states(whole, self._last_states)
+            new_states = self.record.extend(whole)
             if new_states is None:
-                new_states, follows, self._last_states = whole, False, []
+                self.record, follows = GrowingRecord(), False
+                new_states = self.record.extend(whole)
+                assert new_states is not None  # An empty record takes all states.
         self._names = frozenset(names)
-        self._last_states = find_last_states(new_states, self._last_states)
         return new_states, follows
 
     def _read_whole(self, names: Sequence[str]) -> History:
@@ -119,8 +143,7 @@ class Looks:
             run = open_sources(whole_states, self._selection)
             points = _find_resume_points(run)
         run = add_surroundings(run, self._inventory)
-        history = Reference.of(run, self._selection).history
-        return hold_back_states(history), points
+        return Reference.of(run, self._selection).history, points
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:

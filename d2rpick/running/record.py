@@ -33,8 +33,8 @@ class GrowingColumn:
         self._room: NDArray[Any] = np.empty(0)
         self.size = 0
 
-    def add(self, rows: NDArray[Any]) -> None:
-        """Append ``rows`` of shape (k, ...)."""
+    def add(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Append ``rows`` of shape (k, ...), and return all rows so far as a view."""
         size = self.size + len(rows)
         if size > len(self._room):
             row_count = max(2 * size, _FEWEST_ROWS)
@@ -43,6 +43,7 @@ class GrowingColumn:
             self._room = longer
         self._room[self.size : size] = rows
         self.size = size
+        return self.rows
 
     @property
     def rows(self) -> NDArray[Any]:
@@ -68,31 +69,33 @@ class GrowingRecord:
     """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 
     def __init__(self) -> None:
-        self._latest_tables: list[Table] = []
         # Columns, keyed by the number of their table and by their name.
         self._columns: dict[tuple[int, str], GrowingColumn] = {}
-        self._history: History | None = None
+        self.history: History | None = None
 
-    def add(self, states: History) -> None:
-        """Append states, which must have the same quantities as the states so far."""
-        self._latest_tables = _list_tables(states)
-        for number, table in enumerate(self._latest_tables):
+    def extend(self, states: History) -> History | None:
+        """Append the states after the known ones, and return them; None if the last known states are not among them."""
+        tables = _list_tables(states)
+        known_tables = (
+            _list_tables(self.history) if self.history else [None] * len(tables)
+        )
+        if len(tables) != len(known_tables):
+            return None
+        new_tables = []
+        for table, known_table in zip(tables, known_tables, strict=True):
+            new_table = _select_new_states(table, known_table)
+            if new_table is None:
+                return None
+            new_tables.append(new_table)
+        whole_tables = []
+        for number, table in enumerate(new_tables):
+            columns: dict[str, Any] = {}
             for name, rows in list_columns(table).items():
-                self._columns.setdefault((number, name), GrowingColumn()).add(rows)
-        self._history = None
-
-    @property
-    def history(self) -> History:
-        """All states as one history; at least one state must exist."""
-        if self._history is None:
-            columns: list[dict[str, Any]] = [{} for _ in self._latest_tables]
-            for (number, name), column in self._columns.items():
-                columns[number][name] = column.rows
-            pairs = zip(self._latest_tables, columns, strict=True)
-            self._history = _join_tables(
-                [replace(table, **rows) for table, rows in pairs]
-            )
-        return self._history
+                column = self._columns.setdefault((number, name), GrowingColumn())
+                columns[name] = column.add(rows)
+            whole_tables.append(replace(table, **columns))
+        self.history = _join_tables(whole_tables)
+        return _join_tables(new_tables)
 
 
 def _list_tables(history: History) -> list[Table]:
@@ -112,60 +115,30 @@ def _join_tables(tables: Sequence[Any]) -> History:
     return joined
 
 
-def hold_back_states(history: History) -> History:
-    """Remove the last state of a history, if a later state with the same printed time may still replace it."""
-    return _join_tables([_drop_unsettled(table) for table in _list_tables(history)])
+def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
+    """Return the states of a table after the last known one; None if the table lacks this state or has changed it.
 
-
-def _drop_unsettled(table: Table) -> Table:
-    """Remove the last state of a table if its last two times are as close as printed times can be."""
-    if isinstance(table, History):
-        precision = table.time_precision
-    else:
-        precision = table.precision
-    last_times = table.time[-2:].tolist()
-    quantum = precision.quantum(last_times[-1]) if last_times else 0.0
-    if len(last_times) < 2 or last_times[1] - last_times[0] > _APART * quantum:
-        return table
-    return select_states(table, slice(-1))
-
-
-def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; for an empty table, the last state of that table ``before``."""
-    last_states: list[Table] = []
-    tables = _list_tables(history)
-    for table, last_state in zip(tables, before or tables, strict=True):
-        latest = table if table.time.size else last_state
-        last_states.append(select_states(latest, slice(-1, None)))
-    return last_states
-
-
-def skip_states(history: History, last_states: Sequence[Table]) -> History | None:
-    """Return the states of a history after the known last states; None if the history does not contain these.
-
-    ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
+    The last state is left out if a later state with the same printed time may still replace it.
     """
-    tables = _list_tables(history)
-    if len(tables) != len(last_states):
+    new_states = slice(0, table.time.size - _is_unsettled(table))
+    if known_table is None or not known_table.time.size:
+        return select_states(table, new_states)
+    count = int(np.searchsorted(table.time, known_table.time[-1], side="right"))
+    columns, known_columns = list_columns(table), list_columns(known_table)
+    if count == 0 or columns.keys() != known_columns.keys():
         return None
-    new_tables: list[Table] = []
-    for table, last_state in zip(tables, last_states, strict=True):
-        last_time = last_state.time.max(initial=-np.inf)
-        count = int(np.searchsorted(table.time, last_time, side="right"))
-        if last_state.time.size and not _contains(table, count - 1, last_state):
-            return None
-        new_tables.append(select_states(table, slice(count, None)))
-    return _join_tables(new_tables)
-
-
-def _contains(table: Table, state: int, last_state: Table) -> bool:
-    """Return True if a state of a table has the values of the last known state; ``state`` may be -1 for no state."""
-    columns, last_values = list_columns(table), list_columns(last_state)
-    if state < 0 or columns.keys() != last_values.keys():
-        return False
     for name, rows in columns.items():
         tolerance = _SAME * float(np.nanmax(np.abs(rows), initial=0.0))
-        value, last_value = rows[state], last_values[name][0]
-        if not np.allclose(value, last_value, rtol=0, atol=tolerance, equal_nan=True):
-            return False
-    return True
+        change = np.abs(rows[count - 1] - known_columns[name][-1])
+        if np.any(change > tolerance):
+            return None
+    return select_states(table, slice(count, new_states.stop))
+
+
+def _is_unsettled(table: Table) -> bool:
+    """Return True if the last two times of a table are as close as printed times can be."""
+    precision = table.time_precision if isinstance(table, History) else table.precision
+    if table.time.size < 2:
+        return False
+    before, last = table.time[-2:].tolist()
+    return bool(last - before <= _APART * precision.quantum(last))

@@ -15,8 +15,6 @@ from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_name
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
-from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.inner_motion import wait_of_deck
 from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
@@ -63,21 +61,15 @@ class Watch:
         inventory: Inventory | None = None,
     ) -> None:
         self._names = names
-        self._of_looks = (selection, inventory)
-        self._waits = (wait, wait_of_deck(inventory) if inventory else None)
-        self._looks = Looks(*self._of_looks)
-        self._begin_again()
+        self._looks = Looks(selection, inventory, wait)
+        self._wait = wait
+        self._decided: Decided = {}
         self._files: dict[str, WatchedFile] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
         self.ended: str | None = None
-
-    def _begin_again(self) -> None:
-        """Forget all states of the run, but not the reported events."""
-        self._evidence = GrowingEvidence(*self._waits)
-        self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
         """Return the events since the last read; a run that has not begun has none.
@@ -98,7 +90,6 @@ class Watch:
             except (FormatError, HistoryError) as error:
                 # The error is not raised, because the solver may be writing the file at this moment.
                 self._error = error
-                self._looks = Looks(*self._of_looks)
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
         now = time.time()
@@ -130,8 +121,8 @@ class Watch:
                 time, message = None, f"no flight since {event.time:.6g}"
         if (
             time is None
-            and self._evidence.motion.longest(self._last_time) is None
-            and self._waits[0] is None
+            and self._looks.evidence.motion.longest(self._last_time) is None
+            and self._wait is None
         ):
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
@@ -142,18 +133,17 @@ class Watch:
         """Read the new states and return their events."""
         if not names:
             return
-        states, follows = self._looks.new_states(names)
+        states, follows = self._looks.look(names)
         if not states.time.size:
             return
-        balance = states.balance
-        if not states.momenta and (balance is None or balance.sliding is None):
+        evidence = self._looks.evidence
+        if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
         if not follows:
-            self._begin_again()
-        self._evidence.take(states)
-        time = self._evidence.history.time
+            self._decided = {}
+        time = evidence.history.time
         now, before = float(time[-1]), self._last_time
-        events = find_events(self._evidence, self._decided)
+        events = find_events(evidence, self._decided)
         pairs = zip(self._events, events, strict=False)
         kept_count = sum(event == event_before for event, event_before in pairs)
         if before is None:
