@@ -16,8 +16,6 @@ from d2rpick.base.files import (
     parse_record,
     write_as_a_whole,
 )
-from d2rpick.histories.names import Selection
-from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     Leg,
     LegFindings,
@@ -33,11 +31,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.base.errors import Caution
-    from d2rpick.deck.model import Inventory
     from d2rpick.deck.writing import DrivenDeck
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
-    from d2rpick.running.engine import Commands, Solver
+    from d2rpick.running.engine import Solver
+    from d2rpick.running.evidence import GrowingEvidence
+    from d2rpick.running.looks import Looks
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
@@ -86,9 +85,8 @@ class Driver:
     deck: DrivenDeck
     solver: Solver
     journal: Journal
-    commands: Commands
     limits: Limits
-    observer: Observer
+    looks: Looks
     told: Callable[[str], None]
     at: Order | None = None
 
@@ -110,7 +108,7 @@ class Driver:
             path = self.solver.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(path, content)
-        self._start_solver("starter", 0)
+        self.solver.start("starter", 0)
         self._wait_for_end()
         if not self.solver.started_well():
             raise D2RPickError(
@@ -166,7 +164,7 @@ class Driver:
     def _start(self, order: Order) -> None:
         """Write the engine file of a leg and start the engine."""
         number = order.number
-        self.solver.check_room(number, 1 - order.start / self.limits.end)
+        self.solver.check_room(number)
         self.solver.clear(number)
         legs = self.journal.legs
         already_rigid = order.rigid and len(collect_joined_legs(order, legs)) > 1
@@ -176,15 +174,10 @@ class Driver:
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
-        self._start_solver("engine", number)
+        self.solver.start("engine", number)
         self.told(
             f"engine run {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
-
-    def _start_solver(self, program: str, number: int) -> None:
-        """Start the solver on the deck of a leg: the starter if its ``number`` is 0, else the engine."""
-        deck = self.solver.file(number, ".rad").name
-        self.solver.start(self.commands.words(program, deck), number)
 
     def _wait_for_end(self) -> None:
         """Wait until no solver is running; report silence, and stop the solver on KeyboardInterrupt."""
@@ -248,9 +241,9 @@ class Driver:
         number, legs = order.number, self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
-        histories = [self.solver.history(leg.number) for leg in joined_legs]
-        wait_before = _find_longest_wait(legs, first.start)
-        findings = self.observer.look(order, histories, wait_before)
+        histories = [str(self.solver.history(leg.number)) for leg in joined_legs]
+        self.looks.look(histories, _find_longest_wait(legs, first.start))
+        findings = find_leg_results(order, self.looks.evidence)
         cycles, cpu = self.solver.took(number)
         self.journal.add("ended", order=order, seen=findings, cycles=cycles, cpu=cpu)
         if findings.contact is not None:
@@ -283,66 +276,48 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
     return max(waits, default=0.0)
 
 
-class Observer:
-    """Reads the histories of legs for some ``parts`` of a deck; ``wait`` is the wait that the user gave."""
-
-    def __init__(
-        self, parts: Sequence[int], inventory: Inventory, wait: float | None = None
-    ) -> None:
-        selection = Selection(
-            parts=tuple(map(str, parts)),
-            springs=tuple(map(str, sorted(inventory.springs))),
-        )
-        self._looks = Looks(selection, inventory, wait)
-
-    def look(
-        self, order: Order, histories: Sequence[Path], wait_before: float
-    ) -> LegFindings:
-        """Return the findings from the joined histories of several legs at the end of the last leg.
-
-        ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
-        the record shows a longer one, which ``why`` then says.
-        """
-        self._looks.look([*map(str, histories)], wait_before)
-        evidence = self._looks.evidence
-        if order.rigid:
-            return LegFindings(contact=evidence.find_contact())
-        history = evidence.history
-        now = float(history.time[-1])
-        flights = evidence.flights()
-        free = evidence.free_since(now)
-        wait = evidence.find_wait(free, now)
-        flies = bool(flights) and flights[-1].end is None
-        tr = _choose_end(order, history, free)
-        swing = find_swing(history, free, tr) if flies else None
-        # These flights were slightly too short to be switched.
-        short_flights = tuple(
-            (start, end)
-            for start, end in evidence.pauses(order.start)
-            if wait is not None
-            and end - start >= _REPORTED * wait.time
-            and start >= order.switch_after
-        )
-        return LegFindings(
-            free=free,
-            wait=wait.time if wait else None,
-            why=wait.reason if wait else "",
-            flies=flies,
-            tr=tr,
-            idle=wait is not None and wait.source == "at-rest",
-            short=short_flights,
-            swing=evidence.motion.longest_swing(now),
-            steady_from=swing.flight if swing else 0.0,
-            swing_warning=swing.told if swing else "",
-        )
+def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
+    """Return the findings at the end of a leg from the evidence of its joined legs."""
+    if order.rigid:
+        return LegFindings(contact=evidence.find_contact())
+    history = evidence.history
+    flights = evidence.flights()
+    flies = bool(flights) and flights[-1].end is None
+    free = evidence.free_since(history.end)
+    tr = _choose_end(order, history, free)
+    swing = find_swing(history, free, tr) if flies else None
+    findings = LegFindings(
+        free=free,
+        flies=flies,
+        tr=tr,
+        swing=evidence.motion.longest_swing(history.end),
+        steady_from=swing.flight if swing else 0.0,
+        swing_warning=swing.told if swing else "",
+    )
+    wait = evidence.find_wait(free, history.end)
+    if wait is None:
+        return findings
+    # These flights were slightly too short to be switched.
+    short_flights = tuple(
+        (start, end)
+        for start, end in evidence.pauses(order.start)
+        if end - start >= _REPORTED * wait.time and start >= order.switch_after
+    )
+    return findings._replace(
+        wait=wait.time,
+        why=wait.reason,
+        idle=wait.source == "at-rest",
+        short=short_flights,
+    )
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
     """Choose as tr the start of a leg if it is in flight and has more internal energy than the end; else the end."""
-    start = max(order.start, float(history.time[0]))
-    falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
-    starts_in_flight = order.start >= max(free, order.switch_after)
-    return order.start if falls and starts_in_flight else order.until
+    start = max(order.start, history.start)
+    falls = history.energy_at(start) > history.energy_at(history.end)
+    if falls and order.start >= max(free, order.switch_after):
+        return order.start
+    return order.until
 
 
 class Journal:
@@ -373,9 +348,8 @@ class Journal:
     @property
     def has_failed(self) -> bool:
         """True if the next leg has failed before."""
-        outcomes = ("prepared", "ended", "back", "failed")
         events = [record["event"] for record in self.records]
-        return [event for event in events if event in outcomes][-1:] == ["failed"]
+        return [event for event in events if event != "started"][-1:] == ["failed"]
 
     def has(self, event: str) -> bool:
         """Return True if the journal contains a record of the named event."""

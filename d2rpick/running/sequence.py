@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 # PROBE: the parts are rigid, and the leg continues until it shows the contact that ends the flight.
 # RIGID: the parts are rigid, and the leg ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
-RIGID_KINDS: Final = (PROBE, RIGID)
 # Two times are equal if they differ by less than this number of output intervals.
 # A history may end one output interval early.
 _STATES: Final = 1.5
@@ -97,7 +96,7 @@ class Order(NamedTuple):
     @property
     def rigid(self) -> bool:
         """Return True if the parts are rigid in this leg."""
-        return self.kind in RIGID_KINDS
+        return self.kind != LOAD
 
     def following(self, kind: str, until: float) -> Order:
         """Return the order for a leg that begins at the end of this leg."""
@@ -281,25 +280,28 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact that the last leg showed; if it showed none, up to the end of the run."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
-    findings = get_flight_findings(legs)
-    free, wait = findings.free, findings.wait or 0.0
-    tr, end, contact = (
+    findings, contact = get_flight_findings(legs), legs[-1].findings.contact
+    window = Window(
+        findings.free,
         rigid_orders[0].start,
         rigid_orders[-1].until,
-        legs[-1].findings.contact,
+        contact,
+        findings.wait or 0.0,
     )
     if contact is None:
-        return Window(free, tr, end, None, wait)
-    td = contact - limits.margin_of(contact - free, idle=findings.idle)
+        return window
+    flight = contact - findings.free
+    td = contact - limits.margin_of(flight, idle=findings.idle)
     for order in rigid_orders:
         if 0 <= td - order.until <= limits.same:
             td = order.until  # A leg must have at least two states.
-    reason = _explain_too_little_saved(legs, tr, td, limits)
-    if not findings.idle and contact - free < _SWINGS * findings.swing:
+    reason = _explain_too_little_saved(legs, window.tr, td, limits)
+    if not findings.idle and flight < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
-    is_out_of_place = reason is None and td - free < findings.steady_from
-    warning = findings.swing_warning if is_out_of_place else ""
-    return Window(free, tr, td, contact, wait, reason, warning)
+    warning = ""
+    if reason is None and td - findings.free < findings.steady_from:
+        warning = findings.swing_warning
+    return window._replace(td=td, reason=reason, warning=warning)
 
 
 def _explain_too_little_saved(
@@ -311,12 +313,12 @@ def _explain_too_little_saved(
     """
     if td <= tr:
         return "its margin begins before tr"
-    cost, cycles, length = 0.0, 0, 0.0  # The cost is counted in deformable cycles.
+    deformable_legs = [leg for leg in legs if not leg.order.rigid and leg.cycles]
+    length = sum(leg.length for leg in deformable_legs)
+    cycles = sum(leg.cycles or 0 for leg in deformable_legs)
+    cost = 0.0  # The cost is counted in deformable cycles.
     for leg in legs:
-        if not leg.order.rigid:
-            cycles += leg.cycles or 0
-            length += leg.length if leg.cycles else 0.0
-        elif leg.order.start >= tr:
+        if leg.order.rigid and leg.order.start >= tr:
             cost += (leg.cycles or 0) * limits.rigid_cycle + _RESTART
     saved = (td - tr - cost * length / max(cycles, 1)) / limits.end
     if saved >= _WORTH:
