@@ -22,6 +22,7 @@ from d2rpick.running.witness import GrowingWitness, Quiet
 if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
+    from d2rpick.running.events import Event
     from d2rpick.running.inner_motion import MovingParts
 
 # Largest number of states from which gravity is determined.
@@ -45,6 +46,8 @@ class GrowingEvidence:
         before: float = 0.0,
     ) -> None:
         self._given = given
+        # Events of past flights, keyed by the start of the flight and the time at which it was seen.
+        self.decided: dict[tuple[float, float], tuple[Event, ...]] = {}
         self.motion = InnerMotion(of_deck, before)
         self._witnesses: list[GrowingWitness] = []
         # Evidence that still grows, keyed by its parts; None stands for the whole model.

@@ -54,19 +54,17 @@ class Looks:
         """Return True if the next read covers only the last states."""
         return bool(self._resume_points)
 
-    def look(
-        self, names: Sequence[str], wait_before: float = 0.0
-    ) -> tuple[History, bool]:
-        """Add the new states to the evidence, or begin with new evidence; results and errors as `new_states`.
+    def look(self, names: Sequence[str], wait_before: float = 0.0) -> bool:
+        """Add the new states to the evidence, or begin with new evidence; return True if there are new states.
 
-        ``wait_before`` is the waiting time of earlier flights [time].
+        ``wait_before`` is the waiting time of earlier flights [time].  Errors as `new_states`.
         """
         states, follows = self.new_states(names)
         if not follows:
             self.evidence = GrowingEvidence(*self._waits, wait_before)
         if states.time.size and self.record.history:
             self.evidence.take(states, self.record.history)
-        return states, follows
+        return bool(states.time.size)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
         """Read the new states, and report whether they follow those read before.

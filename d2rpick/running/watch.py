@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
-    from d2rpick.running.events import Decided
 
 # Largest share of the time of a processor core that reading may take [-].
 _SHARE: Final = 0.01
@@ -63,7 +62,6 @@ class Watch:
         self._names = names
         self._looks = Looks(selection, inventory, wait)
         self._wait = wait
-        self._decided: Decided = {}
         self._files: dict[str, WatchedFile] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
@@ -108,47 +106,38 @@ class Watch:
 
     def state(self) -> Event:
         """Return a sentence on whether the parts fly now, and since when."""
-        time, message = None, "no flight yet"
         if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
+        time, message = None, "no flight yet"
         for event in self._events:
             if event.event == "flight":
                 time, message = event.time, f"flies since {event.time:.6g}"
             elif event.event == "contact":
                 time, message = None, f"no flight since {event.time:.6g}"
-        if (
-            time is None
-            and self._looks.evidence.motion.longest(self._last_time) is None
-            and self._wait is None
-        ):
+        longest = self._looks.evidence.motion.longest(self._last_time)
+        if time is None and longest is None and self._wait is None:
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
             )
-        return self._make_event("state", message)._replace(time=time)
+        return Event("state", time, self._last_time, message)
 
     def _read(self, names: Sequence[str]) -> Iterator[Event]:
         """Read the new states and return their events."""
-        if not names:
-            return
-        states, follows = self._looks.look(names)
-        if not states.time.size:
+        if not names or not self._looks.look(names):
             return
         evidence = self._looks.evidence
         if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
-        if not follows:
-            self._decided = {}
-        time = evidence.history.time
-        now, before = float(time[-1]), self._last_time
-        events = find_events(evidence, self._decided)
+        now, before = evidence.history.end, self._last_time
+        events = find_events(evidence)
         pairs = zip(self._events, events, strict=False)
         kept_count = sum(event == event_before for event, event_before in pairs)
         if before is None:
             message = f"the run has reached {now:.6g}"
-            yield Event("begun", float(time[0]), now, message)
+            yield Event("begun", evidence.history.start, now, message)
         elif now < before or kept_count < len(self._events):
             message = (
                 f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
