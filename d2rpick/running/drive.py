@@ -135,6 +135,9 @@ class Driver:
             self.told(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
+            if self.journal.has_failed:
+                # The restart file may be damaged although it looks complete.
+                self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
             # An earlier driver may have begun the leg, and the solver has finished it since.
@@ -155,11 +158,14 @@ class Driver:
             order = choose_next_leg(legs, self.limits)
             if order is None or not legs or self.solver.whole(order.number - 1):
                 return order
-            self.journal.add("back", legs=len(legs) - 1)
-            self.told(
-                "the restart file of the last engine run is incomplete: the run goes back to "
-                f"{legs[-1].order.start:.6g}"
-            )
+            self._go_back("its restart file is incomplete")
+
+    def _go_back(self, reason: str) -> None:
+        """Undo the last leg, so that it is computed again."""
+        legs = self.journal.legs
+        self.journal.add("back", legs=len(legs) - 1)
+        start = legs[-1].order.start
+        self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
         """Write the engine file of a leg and start the engine."""
@@ -209,32 +215,21 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Write to the journal that a leg has failed, so that the leg is computed again.
-
-        If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
-        back by the leg that wrote it.
+        """Write to the journal that a leg has failed; if its files are incomplete, it is computed again once.
 
         Raises
         ------
         D2RPickError
-            If the solver reported an error for the first time, or the leg has failed before.
+            If the solver reported an error, or the leg has failed before.
         """
         has_failed = self.journal.has_failed
         self.journal.add("failed", leg=order.number)
-        name = f"engine run {order.number}"
-        legs = self.journal.legs
-        begins = bool(np.any(self.solver.read_times(order.number) >= order.start))
-        if not has_failed and self.solver.ended_well(order.number):
-            self.told(
-                f"{name}: its restart file or history is incomplete; computing it again from {order.start:.6g}"
-            )
-        elif has_failed and legs and not begins:
-            self.journal.add("back", legs=len(legs) - 1)
-            self.told(
-                f"{name} failed again before its first state; computing the engine run before it again"
-            )
-        else:
+        if has_failed or not self.solver.ended_well(order.number):
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
+        self.told(
+            f"engine run {order.number}: its restart file or history is incomplete; "
+            f"computing it again from {order.start:.6g}"
+        )
 
     def _end(self, order: Order) -> None:
         """Write the findings of a leg to the journal."""
@@ -340,7 +335,9 @@ class Journal:
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":
-                legs.append(_read_leg(record))
+                order = Order(*record["order"])
+                findings = LegFindings(*record["seen"])
+                legs.append(Leg(order, findings, record["cycles"], record["cpu"]))
             elif record["event"] == "back":
                 del legs[record["legs"] :]
         return legs
@@ -367,9 +364,3 @@ class Journal:
             ) from None
         self._line_end = b""
         self.records.append(json.loads(line))
-
-
-def _read_leg(record: dict[str, Any]) -> Leg:
-    """Make a leg from a record of the journal."""
-    order, findings = Order(*record["order"]), LegFindings(*record["seen"])
-    return Leg(order, findings, record["cycles"], record["cpu"])

@@ -98,6 +98,10 @@ class Order(NamedTuple):
         """Return True if the parts are rigid in this leg."""
         return self.kind != LOAD
 
+    def undone(self) -> Order:
+        """Return the order at the end of the leg before this one, as if this one had not been computed."""
+        return self._replace(number=self.number - 1, until=self.start)
+
     def following(self, kind: str, until: float) -> Order:
         """Return the order for a leg that begins at the end of this leg."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
@@ -195,12 +199,10 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order = _return_before_contact(legs, limits)
     elif last.until >= limits.end:
         return None
-    elif last.kind == PROBE:
-        order = _order_probe(last, legs, limits)
-    elif last.kind == RIGID:
-        order = _follow_window(last, findings, limits)
+    elif last.kind == PROBE or _starts_window(last, findings, limits):
+        order = _order_probe(legs, limits)
     else:
-        order = _follow_load(legs, limits)
+        order = _order_load(last, findings, limits)
     if order.number > MOST_LEGS:
         raise D2RPickError(
             f"the run needs more than {MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
@@ -208,73 +210,67 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     return order
 
 
-def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order a probe if a flight was seen and can still pay off, else one more deformable leg."""
-    last, findings = legs[-1].order, legs[-1].findings
-    switches = (
+def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
+    """Return True if a deformable leg has shown a flight that may be switched and can still pay off."""
+    return (
         findings.flies
         and findings.free >= last.switch_after
         and limits.end - last.until > _WORTH * limits.end
         and last.number <= MOST_LEGS - _KEPT_BACK
     )
-    if not switches:
-        return _order_load(last, findings, limits)
-    if not findings.idle and findings.tr <= last.start:
-        # The energy was higher at the start of the leg, so the probe begins there and replaces the leg.
-        last = last._replace(number=last.number - 1, until=last.start)
-    return _order_probe(last, legs, limits)
-
-
-def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Return the order for a deformable leg after td. The flight in which the window ends is not switched again."""
-    return _order_load(last, findings, limits)._replace(switch_after=last.until)
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Order a deformable leg that ends as soon as a current or past flight has lasted for the required time."""
+    """Order a deformable leg that ends as soon as a current or past flight has lasted for the required time.
+
+    The flight in which a window ends is not switched again.
+    """
     now, end = last.until, limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
         return last.following(LOAD, end)
-    in_flight = (
-        not last.rigid and findings.free >= last.switch_after and not findings.flies
-    )
-    flight_start = findings.free if in_flight else now
     wait = findings.wait or _UNKNOWN * end
+    flight_start = now
+    if last.rigid:
+        last = last._replace(switch_after=now)
+    elif findings.free >= last.switch_after and not findings.flies:
+        flight_start = findings.free
     until = max(flight_start + wait, now + _LEAST * wait, now + (end - now) / legs_left)
     return last.following(LOAD, limits.until_end(until))
 
 
-def _order_probe(last: Order, legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order the next leg of a probe, which begins at the end of ``last`` or has begun in an earlier leg."""
-    now = last.until
-    flown = now - _get_first_rigid_leg(legs).start if last.rigid else 0.0
+def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
+    """Order the next leg of a probe, which begins after the last leg or has begun in an earlier leg."""
+    last, findings = legs[-1].order, get_flight_findings(legs)
+    flown = 0.0
+    if last.rigid:
+        flown = last.until - collect_joined_legs(last, legs)[0].start
+    elif not findings.idle and findings.tr <= last.start:
+        # The energy was higher at the start of the leg, so the probe begins there and replaces the leg.
+        last = last.undone()
     length = max(
-        get_flight_findings(legs).wait or 0.0,
+        findings.wait or 0.0,
         _OF_FLOWN * flown,
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
     )
-    return last.following(PROBE, limits.until_end(now + length))
+    return last.following(PROBE, limits.until_end(last.until + length))
 
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     """Order the leg that ends the window at its td. If the window does not pay off, order a deformable leg instead."""
-    window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
+    window = find_next_window(legs, limits)
+    orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     if window.reason:
-        before = first._replace(number=first.number - 1, until=first.start)
-        load = _order_load(before, findings, limits)
-        return load._replace(switch_after=first.start + limits.same)
-    last = None
-    for order in collect_joined_legs(legs[-1].order, legs):
-        if order.until <= window.td:
-            last = order
-    if last is None:
-        return first._replace(kind=RIGID, until=window.td)
-    if last.until == window.td:
-        return _follow_window(last, findings, limits)
-    return last.following(RIGID, window.td)
+        load = _order_load(orders[0].undone(), findings, limits)
+        return load._replace(switch_after=window.tr + limits.same)
+    orders_before = [order for order in orders if order.until <= window.td]
+    if not orders_before:
+        return orders[0]._replace(kind=RIGID, until=window.td)
+    if orders_before[-1].until == window.td:
+        return _order_load(orders_before[-1], findings, limits)
+    return orders_before[-1].following(RIGID, window.td)
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
@@ -335,11 +331,6 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
     ):
         joined.insert(0, previous)
     return joined
-
-
-def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
-    """Return the leg in which the parts became rigid, if they are still rigid in the last leg."""
-    return collect_joined_legs(legs[-1].order, legs)[0]
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:

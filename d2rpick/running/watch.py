@@ -48,8 +48,8 @@ class WatchedFile(NamedTuple):
 class Watch:
     """Watches a run that is being computed.
 
-    ``names`` are its files or its folder, which need not exist yet.  ``ended`` says how the listing reports the end of
-    the run, None before.
+    ``names`` are its files or its folder, which need not exist yet; ``looks`` read them.  ``ended`` says how the listing
+    reports the end of the run, None before.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Watch:
         inventory: Inventory | None = None,
     ) -> None:
         self._names = names
-        self._looks = Looks(selection, inventory, wait)
+        self.looks = Looks(selection, inventory, wait)
         self._wait = wait
         self._files: dict[str, WatchedFile] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
@@ -99,11 +99,6 @@ class Watch:
             self._report_silence_after = 2 * silence
             yield self._make_event("silent", f"nothing was written for {silence:.0f} s")
 
-    @property
-    def reads_what_is_new(self) -> bool:
-        """Return True if the next read covers only the new states."""
-        return self._looks.grow
-
     def state(self) -> Event:
         """Return a sentence on whether the parts fly now, and since when."""
         if self._last_time is None:
@@ -117,7 +112,7 @@ class Watch:
                 time, message = event.time, f"flies since {event.time:.6g}"
             elif event.event == "contact":
                 time, message = None, f"no flight since {event.time:.6g}"
-        longest = self._looks.evidence.motion.longest(self._last_time)
+        longest = self.looks.evidence.motion.longest(self._last_time)
         if time is None and longest is None and self._wait is None:
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
@@ -126,9 +121,9 @@ class Watch:
 
     def _read(self, names: Sequence[str]) -> Iterator[Event]:
         """Read the new states and return their events."""
-        if not names or not self._looks.look(names):
+        if not names or not self.looks.look(names):
             return
-        evidence = self._looks.evidence
+        evidence = self.looks.evidence
         if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
         now, before = evidence.history.end, self._last_time
@@ -178,7 +173,7 @@ def follow(
         begun = time.process_time()
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
-        if watch.reads_what_is_new:
+        if watch.looks.grow:
             # Only the first read covers all states, so later pauses are short.
             pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()

@@ -177,11 +177,11 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         result = run(*prepare_drive(tmp_path, "--resume"))
     if (
         fault == "damaged"
-    ):  # segment 4 fails on its restart file; only a second failure shows that this is the cause
+    ):  # segment 4 fails on its restart file, which segment 3 then writes again
         assert "strip_0004.out: the solver failed" in result.stderr
         result = run(*prepare_drive(tmp_path, "--resume"))
         assert (
-            "engine run 4 failed again before its first state; computing the engine run before it again"
+            "the last engine run is computed again from 0.032: the engine run after it has failed"
             in result.stderr
         )
     if fault in ("empty", "cut"):
@@ -257,7 +257,7 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
         path.write_bytes(b"")
     result = run(*prepare_drive(tmp_path, "--resume"))
     assert (
-        "the restart file of the last engine run is incomplete: the run goes back to 0"
+        "the last engine run is computed again from 0: its restart file is incomplete"
         in result.stderr
     )
     check_finished_run(json.loads(result.stdout), tmp_path)
