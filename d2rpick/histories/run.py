@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Legs
+    from d2rpick.histories.resuming import ResumePoint
     from d2rpick.histories.source import Source
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
@@ -73,6 +74,16 @@ class OpenedRun:
         self.sources, self.databases, self.files = sources, databases, files
         self.surroundings = surroundings
         self._notes, self._forces, self._reopen = notes, forces, reopen
+
+    def find_resume_points(self) -> dict[str, ResumePoint]:
+        """Return where a later read of each file can begin; empty if one is always read completely."""
+        points: dict[str, ResumePoint] = {}
+        for database in self.databases:
+            points_of_format = database.find_resume_points()
+            if not points_of_format:
+                return {}
+            points |= points_of_format
+        return points
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._reopen is None:

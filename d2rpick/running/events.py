@@ -105,14 +105,11 @@ def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event
 
 def _describe_start(flight: Quiet) -> Event:
     """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
-    quantity = "contact energy"
-    if flight.source == "momentum":
-        quantity = "momentum less gravity"
     landing = "landing time unknown"
     if flight.level is not None:
         landing = f"on level ground it lands at about {flight.level:.4g}"
     message = (
-        f"{quantity} is constant within {flight.left:.1e} of its maximum for {flight.seen - flight.start:.4g}; "
+        f"{flight.quantity} is constant within {flight.left:.1e} of its maximum for {flight.seen - flight.start:.4g}; "
         f"required force-free time {flight.wait.time:.4g}: {flight.wait.reason}; {landing}"
     )
     return Event(

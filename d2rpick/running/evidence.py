@@ -20,6 +20,8 @@ from d2rpick.running.record import GrowingColumn, RunningMaximum
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
     from d2rpick.running.events import Event
@@ -73,13 +75,9 @@ class GrowingEvidence:
         moving_parts: MovingParts = []
         if of_parts is not None and of_parts.time.size:
             moving_parts = self._add_parts(of_parts, of_model, contact)
-        if of_model is not None:
-            columns = _make_columns(of_model.time, of_model.of((0,)), contact)
-            self._add((0,), None, columns, (of_model, contact))
-        elif contact is not None:
-            motionless = np.zeros((contact.time.size, 3))
-            columns = _make_columns(contact.time, motionless, contact)
-            self._add((), None, columns, (None, contact))
+        members = () if of_model is None else (0,)
+        columns = _make_columns(members, of_model, contact)
+        self._add(members, None, columns, (of_model, contact))
         self.motion.take(states, moving_parts, self.free_since)
 
     def _add_parts(
@@ -101,7 +99,7 @@ class GrowingEvidence:
         changed = (momenta.values != self._first_momenta).any(axis=2)
         has_moved = self._has_moved.add(changed)
         for members in dict.fromkeys(_list_sets(momenta)):
-            columns = _make_columns(momenta.time, momenta.of(members), contact)
+            columns = _make_columns(members, momenta, contact)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
             # Once other parts move, the contact energy includes their contacts and is no longer used.
             other_parts = np.delete(has_moved, members, axis=1)
@@ -266,12 +264,22 @@ def _sample_states(first: int, last: int) -> Samples:
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
 
 
-def _make_columns(time: Samples, momentum: Samples, contact: Balance | None) -> Samples:
-    """Return time, contact energy and momentum as columns (k, 5). The energy is NaN if it is not written."""
-    energy = np.full(time.size, np.nan)
-    if contact is not None and contact.time.size == time.size:
-        energy[:] = contact.sliding
-    return np.column_stack([time, energy, momentum])
+def _make_columns(
+    members: Sequence[int], momenta: Momenta | None, contact: Balance | None
+) -> Samples:
+    """Return time, contact energy and momentum as columns (k, 5); an energy that is not written is NaN.
+
+    The momentum is that of the ``members`` of the momenta, or zero if there are none.
+    """
+    table = momenta or contact
+    if table is None:
+        return np.empty((0, 5))
+    columns = np.full((table.time.size, 5), np.nan)
+    columns[:, 0] = table.time
+    if contact is not None and contact.time.size == table.time.size:
+        columns[:, 1] = contact.sliding
+    columns[:, 2:] = momenta.of(members) if momenta else 0.0
+    return columns
 
 
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:

@@ -25,12 +25,7 @@ from d2rpick.deck.radioss_deck import find_bodies_kept_off
 from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
-from d2rpick.deck.sensor_cards import (
-    write_any_of,
-    write_force_sensor,
-    write_sensor_of_sensors,
-    write_time_sensor,
-)
+from d2rpick.deck.sensor_cards import write_flight_sensors
 from d2rpick.deck.switch_sets import Waiting, write_set_pair
 from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
@@ -170,7 +165,7 @@ def _make_radioss_card(
     (leg,) = run.legs
     starts_moving = run.starter.named("INIVEL") or leg.starts
     at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
-    sensors, contact, flight = _write_sensors(
+    sensors, contact, flight = write_flight_sensors(
         contacts, wait.time, max(after or 0.0, wait.time), bodies.sensor
     )
     largest_step = float(f"{wait.time / _STEPS_PER_WAIT:.2g}")
@@ -195,26 +190,6 @@ def _make_radioss_card(
         notes.append(_OF_WALLS)
     head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
     return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
-
-
-def _write_sensors(
-    contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
-) -> tuple[str, int, int]:
-    """Write sensors that detect a contact force within the waiting time, and a flight; the ids of these two follow."""
-    cards = [
-        write_force_sensor(number, *contact, wait)
-        for number, contact in enumerate(contacts, start=first_id)
-    ]
-    ids = range(first_id, first_id + len(contacts))
-    combined, any_force = write_any_of(ids, "any force")
-    no_force, late_enough, flight = range(any_force + 1, any_force + 4)
-    cards += [
-        combined,
-        write_sensor_of_sensors("NOT", no_force, "no force", any_force),
-        write_time_sensor(late_enough, "from then on", first_switch),
-        write_sensor_of_sensors("AND", flight, "flight", no_force, late_enough),
-    ]
-    return "".join(cards), any_force, flight
 
 
 def _explain_wait(wait: Wait) -> str:
@@ -244,7 +219,6 @@ def _make_ls_dyna_card(
         at_rest = bool(inventory.boundary.gravity) and not starts_moving
         notes.append(_AT_REST if at_rest else _OF_LOAD)
     delay = wait.time / _DELAYS_PER_WAIT
-    rigid_set, deformable_set = printing.swset
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
     lines += write_set_pair(
         printing.swset,
@@ -253,8 +227,8 @@ def _make_ls_dyna_card(
         part_ids,
         printing,
         waits=(
-            Waiting(2, contact, delay, deformable_set, 1),
-            Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
+            Waiting(2, contact, delay),
+            Waiting(4, contact, wait.time, offset=offset),
         ),
     )
     text = "\n".join(lines) + "\n"

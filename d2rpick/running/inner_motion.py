@@ -92,11 +92,6 @@ class _Motion:
         # State at the last turning point, state at the extreme since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
-    def covers(self, now: float) -> bool:
-        """Return True if a time is between the first and the last state."""
-        time = self._columns.rows[:, 0]
-        return bool(time[0] <= now <= time[-1])
-
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
@@ -150,6 +145,8 @@ class _Motion:
         if not swings:
             return False
         time, values, limits = self._columns.rows.T
+        if now > time[-1]:
+            return False
         begin, state = np.searchsorted(time, [swings[-1].end, now]).tolist()
         earlier_values = values[[begin, (begin + state) // 2]]
         change, late_change = np.abs(values[state] - earlier_values).tolist()
@@ -289,12 +286,11 @@ class InnerMotion:
         if self._least is not None:
             return False
         least_strength = _ROTATION * self._get_longest(now).strength
-        motions = [
-            motion for motion in self._part_motions.values() if motion.covers(now)
-        ]
+        motions = (
+            self._part_motions.values() if self._parts_since <= now else [self._energy]
+        )
         return any(
-            motion.outlasts_earlier_swings(now, least_strength)
-            for motion in motions or [self._energy]
+            motion.outlasts_earlier_swings(now, least_strength) for motion in motions
         )
 
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
     from d2rpick.histories.resuming import ResumePoint
-    from d2rpick.histories.run import OpenedRun
 
 # A record with fewer states than this is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
@@ -135,24 +134,13 @@ class Looks:
         The places are {} if the format of a file is always read as a whole.
         """
         run = open_sources(sources, self._selection)
-        points = _find_resume_points(run)
+        points = run.find_resume_points()
         whole_states = [_cut_half_state(source, points) for source in sources]
         if whole_states != [*sources]:
             run = open_sources(whole_states, self._selection)
-            points = _find_resume_points(run)
+            points = run.find_resume_points()
         run = add_surroundings(run, self._inventory)
         return Reference.of(run, self._selection).history, points
-
-
-def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
-    """Return where to continue in the files of a run; {} if a file has a format that is always read completely."""
-    points: dict[str, ResumePoint] = {}
-    for database in run.databases:
-        points_of_format = database.find_resume_points()
-        if not points_of_format:
-            return {}
-        points |= points_of_format
-    return points
 
 
 def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_names
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
+
+    # Number of a file, its size, and the time at which it was written [s].
+    FileStamp = tuple[int, int, float]
 
 # Largest share of the time of a processor core that reading may take [-].
 _SHARE: Final = 0.01
@@ -37,19 +40,11 @@ _NO_EVIDENCE: Final = (
 )
 
 
-class WatchedFile(NamedTuple):
-    """Identity of a watched file: its number, its size, and the time at which it was ``written`` [s]."""
-
-    number: int
-    size: int
-    written: float
-
-
 class Watch:
     """Watches a run that is being computed.
 
-    ``names`` are its files or its folder, which need not exist yet; ``looks`` read them.  ``ended`` says how the listing
-    reports the end of the run, None before.
+    ``names`` are its files or its folder, which need not exist yet.  ``looks`` read the files.  ``ended`` says how the
+    listing reports the end of the run, None before.
     """
 
     def __init__(
@@ -62,7 +57,7 @@ class Watch:
         self._names = names
         self.looks = Looks(selection, inventory, wait)
         self._wait = wait
-        self._files: dict[str, WatchedFile] = {}
+        self._files: dict[str, FileStamp] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
@@ -91,7 +86,7 @@ class Watch:
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
         now = time.time()
-        written = max((stamp.written for stamp in files.values()), default=now)
+        written = max((written for _, _, written in files.values()), default=now)
         silence = now - written
         if self._error and silence > _SILENT:
             raise self._error
@@ -183,8 +178,8 @@ def follow(
         rest(min(pause, remaining))
 
 
-def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
-    """Return the non-empty files of a run, including those of later legs in the same folder, with their stamps."""
+def find_files(names: Sequence[str]) -> dict[str, FileStamp]:
+    """Return the non-empty files of a run, including those of later legs in the same folder."""
     try:
         paths = expand(names)
     except FormatError as error:
@@ -197,7 +192,5 @@ def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
         with suppress(OSError):
             status = Path(path).stat()
             if status.st_size:
-                files[path] = WatchedFile(
-                    status.st_ino, status.st_size, status.st_mtime
-                )
+                files[path] = status.st_ino, status.st_size, status.st_mtime
     return files

@@ -53,8 +53,8 @@ class Quiet(NamedTuple):
         First state at which a force acts [time]; None if the record ends before.
     wait : Wait
         Force-free time that showed the flight.
-    source : str
-        "momentum" or "contact-energy".
+    quantity : str
+        The quantity that shows the flight: "momentum less gravity" or "contact energy".
     left : float
         Change of the momentum or contact energy from ``start`` to ``seen``, as a share of the largest value so far [-].
     gravity : float
@@ -69,7 +69,7 @@ class Quiet(NamedTuple):
     seen: float
     end: float | None
     wait: Wait
-    source: str
+    quantity: str
     left: float
     gravity: float = 0.0
     parts: tuple[Part, ...] | None = None
@@ -208,7 +208,7 @@ class GrowingWitness:
                 seen=float(self.time[state]),
                 end=None,
                 wait=wait,
-                source="momentum" if self.members else "contact-energy",
+                quantity="momentum less gravity" if self.members else "contact energy",
                 left=CONSTANT * self.misfit(first, state),
                 gravity=gravity,
                 parts=self.parts,
