@@ -102,9 +102,9 @@ class Driver:
         if self.journal.has("prepared") and self.solver.whole(0):
             return
         # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
-        first_engine_file = self.solver.file(1, ".rad").name
-        first_leg = self.deck.leg(1, self.deck.end, None)
-        for name, content in {**self.deck.files, first_engine_file: first_leg}.items():
+        engine_file = self.solver.file(1, ".rad").name
+        files = {engine_file: self.deck.leg(1, self.deck.end, None), **self.deck.files}
+        for name, content in files.items():
             path = self.solver.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(path, content)
@@ -174,9 +174,7 @@ class Driver:
         self.solver.clear(number)
         legs = self.journal.legs
         already_rigid = order.rigid and len(collect_joined_legs(order, legs)) > 1
-        largest_step = None
-        if order.rigid:
-            largest_step = _limit_rigid_step(legs, self.deck.interval)
+        largest_step = _limit_step(order, legs, self.deck.interval)
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
@@ -252,8 +250,10 @@ class Driver:
         self.solver.keep(kept_restarts)
 
 
-def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
+def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
     """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+    if not order.rigid:
+        return None
     steps = [
         leg.length / leg.cycles for leg in legs if not leg.order.rigid and leg.cycles
     ]

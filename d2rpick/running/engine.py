@@ -86,10 +86,8 @@ class Commands(NamedTuple):
         if "/" in words[0]:
             # The path is made absolute because the program is started in another folder.
             words[0] = str(Path(words[0]).absolute())
-        threads = str(self.threads)
-        return [
-            word.replace("{threads}", threads).replace("{deck}", deck) for word in words
-        ]
+        words = [word.replace("{threads}", str(self.threads)) for word in words]
+        return [word.replace("{deck}", deck) for word in words]
 
     def make_environment(self) -> dict[str, str]:
         """Return the environment of the programs: the current one with the variables of an installation."""
@@ -181,14 +179,13 @@ class Solver:
         Raises
         ------
         D2RPickError
-            If it cannot be started, or another one is running in the folder.
+            If it cannot be started.
         """
         command = self.commands.words(program, self.file(number, ".rad").name)
         lock = _lock(self._lock_path)
-        if lock is None:
-            raise D2RPickError(
-                f"{self.folder}: a solver is running there; wait for its end"
-            )
+        assert (
+            lock is not None
+        )  # The driver has waited for the end of any other solver.
         try:
             _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:

@@ -11,7 +11,7 @@ from d2rpick.running.inner_motion import check_wait
 from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from d2rpick.histories.history import History
     from d2rpick.running.evidence import GrowingEvidence
@@ -52,7 +52,6 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
         If a given wait is too short.
     """
     flights = evidence.flights()
-    rigid_times = evidence.find_rigid_times()
     history = evidence.history
     events: list[Event] = []
     for flight in flights:
@@ -60,31 +59,23 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
             longest = evidence.motion.longest(flight.seen)
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(flight, evidence)
-    for start, _, end in rigid_times:
+    for start, seen_at, end in evidence.find_rigid_times():
         # No switch is advised if the parts are rigid already.
         events = [
             event
             for event in events
             if event.tr is None or not start <= event.tr <= end
         ]
+        if start <= history.time[:FEWEST][-1]:
+            continue  # Such bodies are always rigid.
+        events.append(Event("rigid", start, seen_at, _RIGID))
+        if end < history.end:
+            events.append(Event("deformable", end, end, "all parts deform again"))
     if not flights or flights[0].start > history.start:
         push = evidence.find_contact(fewest=1)
         if push is not None:
             events.append(Event("load", push, push, "a force acts"))
-    events += _describe_rigid_times(history, rigid_times)
     return tuple(sorted(events, key=lambda event: event.seen or 0.0))
-
-
-def _describe_rigid_times(
-    history: History, rigid_times: Sequence[tuple[float, float, float]]
-) -> Iterator[Event]:
-    """Yield the events at which parts become rigid or deformable, except for bodies that are always rigid."""
-    for start, seen_at, end in rigid_times:
-        if start <= history.time[:FEWEST][-1]:
-            continue
-        yield Event("rigid", start, seen_at, _RIGID)
-        if end < history.end:
-            yield Event("deformable", end, end, "all parts deform again")
 
 
 def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event]:

@@ -47,22 +47,18 @@ class GrowingEvidence:
         of_deck: Wait | None = None,
         before: float = 0.0,
     ) -> None:
-        self._given = given
+        self.given = given
         # Events of past flights, keyed by the start of the flight and the time at which it was seen.
         self.decided: dict[tuple[float, float], tuple[Event, ...]] = {}
         self.motion = InnerMotion(of_deck, before)
-        self._witnesses: list[GrowingWitness] = []
+        # Evidence of each set of parts, followed by that of the model if its momentum or contact energy is written.
+        self.witnesses: list[GrowingWitness] = []
         # Evidence that still grows, keyed by its parts; None stands for the whole model.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
         # For each state, True if the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
-
-    @property
-    def witnesses(self) -> list[GrowingWitness]:
-        """Evidence of each set of parts, followed by that of the model if its momentum or contact energy is written."""
-        return sorted(self._witnesses, key=_is_of_model)
 
     def take(self, states: History, history: History) -> None:
         """Append states, which must have the same quantities as the states so far; ``history`` are all states."""
@@ -130,7 +126,8 @@ class GrowingEvidence:
         for stretch in find_stretches(has_momentum):
             if stretch.start > 0 or parts not in self._going_on:
                 self._going_on[parts] = GrowingWitness(members, parts)
-                self._witnesses.append(self._going_on[parts])
+                self.witnesses.append(self._going_on[parts])
+                self.witnesses.sort(key=lambda witness: witness.parts is None)
             self._going_on[parts].add(columns[stretch], *precisions)
         if not has_momentum[-1:].all():
             self._going_on.pop(parts, None)
@@ -141,12 +138,12 @@ class GrowingEvidence:
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         candidates: list[tuple[Quiet, float]] = []
-        for witness in self._witnesses:
+        for witness in self.witnesses:
             witness.examine(self.find_wait, self._find_gravity)
             last_time = float(witness.time[-1])
             candidates += [(flight, last_time) for flight in witness.flights]
-        # If two sets of parts show a flight at the same state, that of parts comes first.
-        candidates.sort(key=lambda pair: (pair[0].seen, pair[0].parts is None))
+        # If parts and the model show a flight at the same state, that of the parts comes first.
+        candidates.sort(key=lambda pair: pair[0].seen)
         chosen: list[Quiet] = []
         for flight, last_time in candidates:
             last_end = chosen[-1].end if chosen else -np.inf
@@ -166,11 +163,11 @@ class GrowingEvidence:
     def find_wait(self, start: float, now: float) -> Wait | None:
         """Return the waiting time for a flight since ``start``, from the states up to ``now``; None if unknown."""
         longest = self.motion.longest(now)
-        if self._given is not None:
+        if self.given is not None:
             reason = "as given"
-            if longest is not None and longest.time > self._given:
+            if longest is not None and longest.time > self.given:
                 reason = f"as given, but {longest.reason}"
-            return Wait(self._given, "given", reason)
+            return Wait(self.given, "given", reason)
         first_times = self.history.time[:FEWEST]
         begins_free = first_times.size == FEWEST and start <= first_times[-1]
         if begins_free and self._stores_no_energy(start, now):
@@ -202,8 +199,8 @@ class GrowingEvidence:
             return 0.0
         momenta = history.find_momenta(of_parts=witness.parts is not None)
         assert momenta is not None
-        times = witness.time[[0, first, last]]
-        begin, start, end = np.searchsorted(momenta.time, times).tolist()
+        begin = int(np.searchsorted(momenta.time, witness.time[0]))
+        start, end = begin + first, begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
@@ -214,7 +211,7 @@ class GrowingEvidence:
     def free_since(self, time: float) -> float:
         """Return the start of the force-free time that lasts up to a time; if there are no states, return the time."""
         starts = [time]
-        for witness in self._witnesses:
+        for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
             if state >= 0 and time <= witness.time[-1]:
                 starts.append(float(witness.time[witness.free[state]]))
@@ -222,8 +219,9 @@ class GrowingEvidence:
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
         """Return all force-free times that ended after ``since``, before they were seen as flights."""
-        for witness in sorted(self._going_on.values(), key=_is_of_model):
-            return tuple(pause for pause in witness.pauses if pause[1] > since)
+        for witness in self.witnesses:
+            if self._going_on.get(witness.parts) is witness:
+                return tuple(pause for pause in witness.pauses if pause[1] > since)
         return ()
 
     def find_contact(self, fewest: int = FEWEST) -> float | None:
@@ -252,11 +250,6 @@ class GrowingEvidence:
             states = [stretch.start, stretch.start + FEWEST - 1, end]
             rigid_times.append(tuple(momenta.time[states].tolist()))
         return rigid_times
-
-
-def _is_of_model(witness: GrowingWitness) -> bool:
-    """Return True if the evidence concerns the model; such evidence is used after the evidence of parts."""
-    return witness.parts is None
 
 
 def _sample_states(first: int, last: int) -> Samples:

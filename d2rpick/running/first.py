@@ -122,9 +122,10 @@ def first_card(
         )
     refuse_held(path, inventory, chosen)
     needed = _choose_wait(path, inventory, wait)
+    make_card = _make_ls_dyna_card
     if inventory.solver == "radioss":
-        return _make_radioss_card(path, inventory, chosen, needed, after), needed
-    return _make_ls_dyna_card(path, inventory, chosen, needed, after), needed
+        make_card = _make_radioss_card
+    return make_card(path, inventory, chosen, needed, after), needed
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:

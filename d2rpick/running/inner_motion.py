@@ -17,7 +17,7 @@ from d2rpick.deck.pieces import find_inner_period
 from d2rpick.running.record import GrowingColumn, RunningMaximum
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
@@ -160,17 +160,15 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the inner motion so far [time], and the part or energy that showed it.
+    """The longest half period of the inner motion so far, as the ``wait`` for which it asks; None if there is none.
 
-    ``since`` is the time of detection, ``over`` the end of the half period. ``strength`` is the largest mean rate of
-    change so far. ``swing`` is half of the longest swing, even if a force pushed the swing [time].
+    ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
+    the longest swing, even if a force pushed the swing [time].
     """
 
     since: float
-    half: float = 0.0
+    wait: Wait | None = None
     strength: float = 0.0
-    name: str = ""
-    over: float = 0.0
     swing: float = 0.0
 
 
@@ -206,13 +204,10 @@ class InnerMotion:
         momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses, moving_parts)
-            for swing in sorted(swings, key=lambda swing: swing.seen_at):
-                is_free = free_since(swing.end) <= swing.begin
-                self._learn(swing, self._longest_of_parts, is_free=is_free)
+            self._learn(swings, self._longest_of_parts, free_since)
         least_swing = _AT_REST * self._largest_energy.add(np.abs(states.energy))
-        for swing in self._energy.add(states.time, states.energy, least_swing):
-            is_free = free_since(swing.end) <= swing.begin
-            self._learn(swing, self._longest_of_energy, is_free=is_free)
+        swings = self._energy.add(states.time, states.energy, least_swing)
+        self._learn(swings, self._longest_of_energy, free_since)
 
     def _follow_parts(
         self, momenta: Momenta, masses: Samples, moving_parts: MovingParts
@@ -241,34 +236,39 @@ class InnerMotion:
                     yield from motion.add(time, values, least_swing)
 
     def _learn(
-        self, swing: _HalfPeriod, so_far: list[_Longest], *, is_free: bool
+        self,
+        swings: Iterable[_HalfPeriod],
+        so_far: list[_Longest],
+        free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time if a completed half period requires it and was neither a rotation nor pushed.
+        """Lengthen the waiting time by completed half periods that were neither a rotation nor pushed.
 
         A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """
-        motion = swing.motion
-        motion.has_free_swing |= is_free
-        strongest = max(so_far[-1].strength, swing.strength)
-        longest = so_far[-1]._replace(since=swing.seen_at, strength=strongest)
-        is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
-        if swing.strength >= _ROTATION * strongest and not is_too_long:
+        for swing in sorted(swings, key=lambda swing: swing.seen_at):
+            motion = swing.motion
+            is_free = free_since(swing.end) <= swing.begin
+            motion.has_free_swing |= is_free
+            strongest = max(so_far[-1].strength, swing.strength)
+            longest = so_far[-1]._replace(since=swing.seen_at, strength=strongest)
+            so_far.append(longest)
+            is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
+            if swing.strength < _ROTATION * strongest or is_too_long:
+                continue
             half = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
             longest = longest._replace(swing=max(longest.swing, half))
             counts = is_free or not (motion.has_free_swing or self._least)
-            if counts and swing.half > longest.half:
-                longest = longest._replace(
-                    half=swing.half, name=motion.name, over=swing.seen_at
-                )
-        so_far.append(longest)
+            if counts and (longest.wait is None or swing.half > longest.wait.time):
+                reason = f"{motion.name} took {swing.half:.3g} for half a period, until {swing.seen_at:.6g}"
+                longest = longest._replace(wait=Wait(swing.half, "record", reason))
+            so_far[-1] = longest
 
     def longest(self, now: float) -> Wait | None:
         """Return the longest half period known ``now``, from the deck or from the record so far."""
-        longest = self._get_longest(now)
-        if longest.half <= (self._least.time if self._least else 0.0):
+        wait = self._get_longest(now).wait
+        if wait is None or (self._least and wait.time <= self._least.time):
             return self._least
-        reason = f"{longest.name} took {longest.half:.3g} for half a period, until {longest.over:.6g}"
-        return Wait(longest.half, "record", reason)
+        return wait
 
     def longest_swing(self, now: float) -> float:
         """Return the longest half period known ``now``, even if a push lengthened it [time]."""
@@ -308,7 +308,7 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
     if longest is None:
         return
     shortest = longest.time if longest.least is None else longest.least
-    if shortest and given < _EXACT * shortest:
+    if given < _EXACT * shortest:
         raise RangeError(
             f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a known period: {longest.reason}; a gap in the "
             "load would be treated as flight, so give a longer one"

@@ -17,7 +17,7 @@ from d2rpick.running.inner_motion import wait_of_deck
 from d2rpick.running.record import GrowingRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
@@ -44,14 +44,10 @@ class Looks:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self.evidence = GrowingEvidence(*self._waits)
         self.record = GrowingRecord()
-        # For each file, where the next read continues, and all files of the last read.
-        self._resume_points: dict[str, ResumePoint] = {}
+        # For each file, where the next read continues; {} if the next read covers all states.
+        self.resume_points: dict[str, ResumePoint] = {}
+        # All files of the last read.
         self._names: frozenset[str] = frozenset()
-
-    @property
-    def grow(self) -> bool:
-        """Return True if the next read covers only the last states."""
-        return bool(self._resume_points)
 
     def look(self, names: Sequence[str], wait_before: float = 0.0) -> bool:
         """Add the new states to the evidence, or begin with new evidence; return True if there are new states.
@@ -79,7 +75,7 @@ class Looks:
         """
         if not self._names <= {*names}:
             # A file no longer exists, so all files are read from their start.
-            self._resume_points, self.record = {}, GrowingRecord()
+            self.resume_points, self.record = {}, GrowingRecord()
         follows = self.record.history is not None
         states = self._read_on(names)
         new_states = states and self.record.extend(states)
@@ -99,7 +95,7 @@ class Looks:
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)
         is_short = history.time.size < _FEWEST_STATES
-        self._resume_points = {} if is_packed or is_short else points
+        self.resume_points = {} if is_packed or is_short else points
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
@@ -108,22 +104,22 @@ class Looks:
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
         be read from its resume point, as when it was written anew.
         """
-        if not self._resume_points:
+        if not self.resume_points:
             return None
         sources = []
         for name in names:
-            if name in self._resume_points:
-                sources.append(Source(name, self._resume_points[name].read_on(name)))
+            if name in self.resume_points:
+                sources.append(Source(name, self.resume_points[name].read_on(name)))
             elif name not in self._names:
                 sources.append(open_source(name))
         try:
             history, points = self._open(sources)
         except (FormatError, HistoryError):
             return None
-        for name, point in self._resume_points.items():
+        for name, point in self.resume_points.items():
             if name in points:
                 points[name] = point.locate(points[name])
-        self._resume_points = points
+        self.resume_points = points
         return history
 
     def _open(
@@ -135,17 +131,13 @@ class Looks:
         """
         run = open_sources(sources, self._selection)
         points = run.find_resume_points()
-        whole_states = [_cut_half_state(source, points) for source in sources]
+        whole_states = [*sources]
+        for number, source in enumerate(sources):
+            if source.name in points:
+                data = source.data[: points[source.name].end]
+                whole_states[number] = source._replace(data=data)
         if whole_states != [*sources]:
             run = open_sources(whole_states, self._selection)
             points = run.find_resume_points()
         run = add_surroundings(run, self._inventory)
         return Reference.of(run, self._selection).history, points
-
-
-def _cut_half_state(source: Source, points: Mapping[str, ResumePoint]) -> Source:
-    """Remove an incomplete last state from a file."""
-    point = points.get(source.name)
-    if point is None or point.end == len(source.data):
-        return source
-    return source._replace(data=source.data[: point.end])

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Number of rows for which a new column reserves memory.
-_FEWEST_ROWS: Final = 64
 # Two states are different if their times differ by more than this many units of the last printed digit.
 _APART: Final = 1.5
 # Tolerance for a value that is read twice, as a share of the largest value [-]; sums over parts may be rounded.
@@ -27,28 +25,22 @@ _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array that grows by rows and is copied only when its capacity doubles."""
+    """An array ``rows`` that grows and is copied only when its capacity doubles."""
 
     def __init__(self) -> None:
-        self._room: NDArray[Any] = np.empty(0)
-        self.size = 0
+        self.rows: NDArray[Any] = np.empty(0)
+        self._room = self.rows
 
     def add(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Append ``rows`` of shape (k, ...), and return all rows so far as a view."""
-        size = self.size + len(rows)
+        first, size = len(self.rows), len(self.rows) + len(rows)
+        shape = rows.shape[1:]
         if size > len(self._room):
-            row_count = max(2 * size, _FEWEST_ROWS)
-            longer = np.empty((row_count, *rows.shape[1:]), rows.dtype)
-            longer[: self.size] = self.rows if self.size else 0
-            self._room = longer
-        self._room[self.size : size] = rows
-        self.size = size
+            self._room = np.empty((2 * size, *shape), rows.dtype)
+            self._room[:first] = self.rows.reshape(first, *shape)
+        self._room[first:size] = rows
+        self.rows = self._room[:size]
         return self.rows
-
-    @property
-    def rows(self) -> NDArray[Any]:
-        """All rows so far, as a view."""
-        return self._room[: self.size]
 
 
 class RunningMaximum:

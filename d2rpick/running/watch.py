@@ -56,7 +56,6 @@ class Watch:
     ) -> None:
         self._names = names
         self.looks = Looks(selection, inventory, wait)
-        self._wait = wait
         self._files: dict[str, FileStamp] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
@@ -86,8 +85,7 @@ class Watch:
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
         now = time.time()
-        written = max((written for _, _, written in files.values()), default=now)
-        silence = now - written
+        silence = now - max((written for _, _, written in files.values()), default=now)
         if self._error and silence > _SILENT:
             raise self._error
         if silence > self._report_silence_after and not self.ended:
@@ -107,12 +105,13 @@ class Watch:
                 time, message = event.time, f"flies since {event.time:.6g}"
             elif event.event == "contact":
                 time, message = None, f"no flight since {event.time:.6g}"
-        longest = self.looks.evidence.motion.longest(self._last_time)
-        if time is None and longest is None and self._wait is None:
+        now, evidence = self._last_time, self.looks.evidence
+        wait = evidence.given or evidence.motion.longest(now)
+        if time is None and wait is None:
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
             )
-        return Event("state", time, self._last_time, message)
+        return Event("state", time, now, message)
 
     def _read(self, names: Sequence[str]) -> Iterator[Event]:
         """Read the new states and return their events."""
@@ -168,7 +167,7 @@ def follow(
         begun = time.process_time()
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
-        if watch.looks.grow:
+        if watch.looks.resume_points:
             # Only the first read covers all states, so later pauses are short.
             pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()

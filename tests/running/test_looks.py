@@ -147,7 +147,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
     assert np.array_equal(np.concatenate(energies), whole.energy)
     assert not times[-1].size  # nothing was written since the previous look
     assert len(times) > 2
-    assert looks.grow is (form != "momenta")
+    assert bool(looks.resume_points) is (form != "momenta")
 
 
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
@@ -291,7 +291,7 @@ def test_both_branches_of_a_binout_are_read_on_wherever_it_ends(
         path.write_bytes(data[: mark + 5])
         states, follows = looks.new_states([str(path)])
         assert follows is bool(pieces)
-        assert looks.grow
+        assert looks.resume_points
         pieces.append(states)
     assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
     for number, momenta in enumerate(whole.momenta):
