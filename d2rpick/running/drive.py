@@ -153,12 +153,12 @@ class Driver:
 
     def _choose_next(self) -> Order | None:
         """Choose the next leg. If its restart file is damaged, go back leg by leg to a complete restart file."""
-        while True:
-            legs = self.journal.legs
-            order = choose_next_leg(legs, self.limits)
-            if order is None or not legs or self.solver.whole(order.number - 1):
-                return order
-            self._go_back("its restart file is incomplete")
+        legs = self.journal.legs
+        order = choose_next_leg(legs, self.limits)
+        if order is None or not legs or self.solver.whole(order.number - 1):
+            return order
+        self._go_back("its restart file is incomplete")
+        return self._choose_next()
 
     def _go_back(self, reason: str) -> None:
         """Undo the last leg, so that it is computed again."""

@@ -20,7 +20,7 @@ from d2rpick.running.record import GrowingColumn, RunningMaximum
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
@@ -179,11 +179,11 @@ class GrowingEvidence:
         """Return True if the internal energy is round-off in a span, compared with the kinetic energy if written."""
         history = self.history
         internal = np.abs(history.between(start, now)[1]).max()
-        balance = history.balance
-        if balance is None or balance.kinetic is None:
-            return bool(internal == 0)
-        inside = find_window(balance.time, start, now)
-        return bool(internal <= _ROUND_OFF * balance.kinetic[inside].max(initial=0.0))
+        balance, kinetic = history.balance, 0.0
+        if balance is not None and balance.kinetic is not None:
+            inside = find_window(balance.time, start, now)
+            kinetic = balance.kinetic[inside].max(initial=0.0)
+        return bool(internal <= _ROUND_OFF * kinetic)
 
     def _find_gravity(
         self, witness: GrowingWitness, first: int, last: int
@@ -236,20 +236,17 @@ class GrowingEvidence:
                 return contacts[0] if contacts else None
         return None
 
-    def find_rigid_times(self) -> list[tuple[float, float, float]]:
-        """Return the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
+    def find_rigid_times(self) -> Iterator[tuple[float, ...]]:
+        """Yield the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
 
         The last of these periods may last to the end of the record.
         """
         momenta = self.history.find_momenta(of_parts=True)
-        if momenta is None:
-            return []
-        rigid_times = []
         for stretch in find_stretches(self._complete.rows == 0, FEWEST):
+            assert momenta is not None
             end = min(stretch.stop, momenta.time.size - 1)
             states = [stretch.start, stretch.start + FEWEST - 1, end]
-            rigid_times.append(tuple(momenta.time[states].tolist()))
-        return rigid_times
+            yield tuple(momenta.time[states].tolist())
 
 
 def _sample_states(first: int, last: int) -> Samples:
@@ -283,7 +280,8 @@ def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
     assert momenta.parts is not None
     ids = [part.id for part in momenta.parts]
     joined = {ids[number] for number in momenta.flying or momenta.chosen}
-    bodies = [{*body} for body in momenta.surroundings.bodies()]
-    joined = joined.union(*(body for body in bodies if body & joined))
+    for body in momenta.surroundings.bodies():
+        if not joined.isdisjoint(body):
+            joined.update(body)
     body_numbers = tuple(number for number, part in enumerate(ids) if part in joined)
     return body_numbers, tuple(range(len(ids)))

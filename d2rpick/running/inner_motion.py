@@ -179,9 +179,10 @@ class InnerMotion:
     """
 
     def __init__(self, of_deck: Wait | None = None, before: float = 0.0) -> None:
-        self._least = of_deck
-        self._half_of_springs = of_deck.time if of_deck else np.inf
-        if before > (of_deck.time if of_deck else 0.0):
+        time_of_deck = of_deck.time if of_deck else 0.0
+        self._half_of_springs = time_of_deck or np.inf
+        self._least, self._least_time = of_deck, max(before, time_of_deck)
+        if before > time_of_deck:
             self._least = Wait(before, "record", "as in the flight before")
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         # Motions of parts, keyed by the number of times without motion before and the indices of part and axis.
@@ -266,14 +267,13 @@ class InnerMotion:
     def longest(self, now: float) -> Wait | None:
         """Return the longest half period known ``now``, from the deck or from the record so far."""
         wait = self._get_longest(now).wait
-        if wait is None or (self._least and wait.time <= self._least.time):
+        if wait is None or wait.time <= self._least_time:
             return self._least
         return wait
 
     def longest_swing(self, now: float) -> float:
         """Return the longest half period known ``now``, even if a push lengthened it [time]."""
-        least = self._least.time if self._least else 0.0
-        return max(self._get_longest(now).swing, least)
+        return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:
         """Return the longest half period known at a time: from the parts, or from the energy while no part moves."""
