@@ -280,15 +280,10 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     flies = bool(flights) and flights[-1].end is None
     free = evidence.free_since(history.end)
     tr = _choose_end(order, history, free)
-    swing = find_swing(history, free, tr) if flies else None
-    findings = LegFindings(
-        free=free,
-        flies=flies,
-        tr=tr,
-        swing=evidence.motion.longest_swing(history.end),
-        steady_from=swing.flight if swing else 0.0,
-        swing_warning=swing.told if swing else "",
-    )
+    half_period = evidence.motion.longest_swing(history.end)
+    findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)
+    if flies and (swing := find_swing(history, free, tr)):
+        findings = findings._replace(steady_from=swing.flight, swing_warning=swing.told)
     wait = evidence.find_wait(free, history.end)
     if wait is None:
         return findings
@@ -298,11 +293,9 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
         for start, end in evidence.pauses(order.start)
         if end - start >= _REPORTED * wait.time and start >= order.switch_after
     )
+    is_idle = wait.source == "at-rest"
     return findings._replace(
-        wait=wait.time,
-        why=wait.reason,
-        idle=wait.source == "at-rest",
-        short=short_flights,
+        wait=wait.time, why=wait.reason, idle=is_idle, short=short_flights
     )
 
 

@@ -119,9 +119,9 @@ class _Motion:
     def _begin(self, rows: Samples) -> None:
         """Begin to follow the motion, which is first seen at the last of its states."""
         distance = np.abs(rows[:, 1] - rows[-1, 1])
-        self._turn = int(np.flatnonzero(distance == distance.max())[-1])
         self._extreme = len(rows) - 1
-        self._sign = 1 if rows[-1, 1] > rows[self._turn, 1] else -1
+        self._turn = self._extreme - int(np.argmax(distance[::-1]))
+        self._sign = int(np.sign(rows[-1, 1] - rows[self._turn, 1]))
         now = float(rows[-1, 0])
         self._swings.append(_HalfPeriod(self, now, now, now))
 
@@ -286,9 +286,9 @@ class InnerMotion:
         if self._least is not None:
             return False
         least_strength = _ROTATION * self._get_longest(now).strength
-        motions = (
-            self._part_motions.values() if self._parts_since <= now else [self._energy]
-        )
+        motions = [self._energy]
+        if self._parts_since <= now:
+            motions = [*self._part_motions.values()]
         return any(
             motion.outlasts_earlier_swings(now, least_strength) for motion in motions
         )

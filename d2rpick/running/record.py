@@ -7,14 +7,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.histories.history import Given, History, list_columns, select_states
+from d2rpick.histories.history import (
+    Given,
+    History,
+    Momenta,
+    list_columns,
+    select_states,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, Momenta
+    from d2rpick.histories.history import Balance
 
     Table = History | Momenta | Balance
 
@@ -68,17 +74,15 @@ class GrowingRecord:
     def extend(self, states: History) -> History | None:
         """Append the states after the known ones, and return them; None if the last known states are not among them."""
         tables = _list_tables(states)
-        known_tables = (
-            _list_tables(self.history) if self.history else [None] * len(tables)
-        )
+        known_tables: list[Any] = [None] * len(tables)
+        if self.history:
+            known_tables = _list_tables(self.history)
         if len(tables) != len(known_tables):
             return None
-        new_tables = []
-        for table, known_table in zip(tables, known_tables, strict=True):
-            new_table = _select_new_states(table, known_table)
-            if new_table is None:
-                return None
-            new_tables.append(new_table)
+        selected_tables = map(_select_new_states, tables, known_tables)
+        new_tables = [table for table in selected_tables if table is not None]
+        if len(new_tables) < len(tables):
+            return None
         whole_tables = []
         for number, table in enumerate(new_tables):
             columns: dict[str, Any] = {}
@@ -124,13 +128,20 @@ def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
         change = np.abs(rows[count - 1] - known_columns[name][-1])
         if np.any(change > tolerance):
             return None
-    return select_states(table, slice(count, new_states.stop))
+    selected = select_states(table, slice(count, new_states.stop))
+    if isinstance(selected, Momenta) and isinstance(known_table, Momenta):
+        # A mass that is not written is a lower bound from the states that were read.
+        masses = [selected.masses, known_table.masses]
+        known_masses = [values for values in masses if values is not None]
+        if known_masses:
+            return replace(selected, masses=np.fmax.reduce(known_masses))
+    return selected
 
 
 def _is_unsettled(table: Table) -> bool:
     """Return True if the last two times of a table are as close as printed times can be."""
-    precision = table.time_precision if isinstance(table, History) else table.precision
-    if table.time.size < 2:
-        return False
-    before, last = table.time[-2:].tolist()
-    return bool(last - before <= _APART * precision.quantum(last))
+    precision = (
+        table.precision if not isinstance(table, History) else table.time_precision
+    )
+    steps = np.diff(table.time[-2:])
+    return any(steps <= _APART * precision.quanta(table.time[-1:]))

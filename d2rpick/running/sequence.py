@@ -158,11 +158,6 @@ class Leg(NamedTuple):
     cpu: float | None = None
 
     @property
-    def kind(self) -> str:
-        """Kind of the leg: load, probe or rigid."""
-        return self.order.kind
-
-    @property
     def length(self) -> float:
         """Duration of the leg [time]."""
         return self.order.until - self.order.start
