@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
-    # Smallest mean energy relative to the reference run; well-switched computed runs had at least 0.77.
+    # Smallest ratio of mean energy to the reference run; well-switched computed runs had at least 0.77.
     0.7
 )
 # Options for reading a history; a deck that is checked defines its parts itself.
@@ -55,7 +55,7 @@ ADVANCED: Final = (
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights that do not come from a file.
-# A command line that contains this placeholder is refused, because it cannot repeat the weights.
+# A command line with this placeholder for weights is refused, because it cannot repeat the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -107,8 +107,8 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# The class is never changed, but it is not frozen, like other tables of options.
-# A frozen class would cost each command 2 % of its start-up time.
+# Objects of this class never change, but it is not frozen, like the other tables of options.
+# A frozen class of options would increase the start-up time of each command by 2 %.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run with times in the unit of the history; contradictions raise ArgumentError.
@@ -135,7 +135,7 @@ class Request(ChoiceOptions, ReadingOptions):
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run whose files `history` names.
-    # The value is True if `deck` was found in the folder of the run.
+    # True if `deck` was found in the folder of the run.
     deck_in_folder: bool = False
     given: Collection[str] | None = None
 
@@ -229,7 +229,7 @@ class Request(ChoiceOptions, ReadingOptions):
             from d2rpick.vibration.oscillator import to_mode
 
             mode = to_mode(oscillator, self.v0)
-        # Options that have no value keep the defaults of the settings.
+        # Options without a value keep the defaults of the settings.
         chosen = {
             name: getattr(self, name)
             for name in _USES
@@ -262,14 +262,14 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` judge by the same history."""
+        """Return the options with which ``card`` and ``check`` judge windows by the same history."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def without_history(self) -> None:
-        """Refuse options for judging if there is no history by which to judge."""
+        """Refuse options for judging if there is no history."""
         if lost := [
             name
             for name in self._given()
@@ -325,7 +325,7 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
 
 
 def check_window(name: str, window: tuple[float, float] | None) -> None:
-    """Refuse an empty window of time."""
+    """Refuse an empty time window."""
     if window and not window[0] < window[1]:
         raise ArgumentError(
             f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first"
@@ -335,7 +335,7 @@ def check_window(name: str, window: tuple[float, float] | None) -> None:
 def choose_time_or_window(
     td: float | None, window: tuple[float, float] | None
 ) -> float | tuple[float, float] | None:
-    """Return the given td or the window for td; raise ArgumentError if both are given."""
+    """Return the given td or the range for td; raise ArgumentError if both are given."""
     if td is not None and window is not None:
         raise ArgumentError(
             "`td` and `td_window` exclude each other: give `td` to keep that time, `td_window` to have it chosen"

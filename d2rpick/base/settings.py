@@ -3,7 +3,7 @@
 The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
 """
 # ruff: noqa: PTH100, PTH110, PTH111, PTH113, PTH116, PTH118, PTH120, PTH121, PTH123
-# Every command looks for settings, and importing pathlib takes longer than the search.
+# Every command looks for settings, and importing pathlib takes longer than this search.
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def find_nearest_settings(folder: str) -> NearestSettings:
 
 
 def _list_searched_folders(folder: str) -> Iterator[str]:
-    """Yield a folder and those above it, up to the root of its repository or the user's home.
+    """Yield a folder and the folders above it, up to the root of its repository or to the user's home.
 
     Outside both, the search ends below the first folder that another user owns, and below the root of the system.
     """
@@ -102,7 +102,7 @@ def _is_owned_by_user(path: str) -> bool:
 
 
 def format_toml_value(value: object) -> str:
-    """Format a value from a TOML file for a message, cut if it is long.
+    """Format a value from a TOML file for a message; a long value is cut.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def refuse_unknown_settings(
 
 
 def _has_settings(path: str) -> bool:
-    """Return True if an unused pyproject.toml has settings for d2rpick; False if it cannot be read."""
+    """Return True if an unused pyproject.toml has settings for d2rpick; False if it has none or cannot be read."""
     try:
         return _read_table(path, shared=True) is not None
     except ConfigurationError:
@@ -179,7 +179,7 @@ def _may_have_settings(text: str) -> bool:
 
 
 def _read_table(path: str, *, shared: bool) -> object:
-    """Read the settings of a TOML file; None if a file that is ``shared`` with other tools has no settings."""
+    """Read the settings in a TOML file; None if a file that is ``shared`` with other tools has no settings."""
     try:
         # utf-8-sig: editors on Windows begin a text with a byte order mark
         with open(path, encoding="utf-8-sig") as file:

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# The search for a better pair ends after this number of pairs at other energy peaks was found inadmissible.
+# Number of pairs at other energy peaks that may be found inadmissible before the search for a better pair ends.
 _MOST_REFUSED = 3
 
 
@@ -85,7 +85,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def verified(self) -> bool:
-        """True if the pair is admissible, its grade is not poor, and its residual is at most 0.5."""
+        """True if the pair is admissible, its grade is not "poor", and its residual is at most 0.5."""
         residual = self.candidate.residual
         is_kept = residual is None or residual <= POOR_RESIDUAL
         return is_kept and self.decision.grade != POOR
@@ -97,7 +97,7 @@ class PairVerdict(AnswerAtTd):
         return self._decide(self.better) if decision.grade == POOR else decision
 
     def _decide(self, better: Pair | None) -> Decision:
-        """Decide on the pair; ``better`` is a better pair, if one is known."""
+        """Decide on the pair; ``better`` is a better pair, or None if no better pair is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         decision = decide(
@@ -115,12 +115,12 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair that is not poor, for this td or at the nearest better td; None if there is none."""
+        """A better pair whose grade is not "poor", for this td or at the nearest better td; None if there is none."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
     def _good_pair(self) -> Pair | None:
-        """The pair that the reference run recommends, whatever a finished switched run shows."""
+        """The pair recommended from the reference run alone, without regard to a finished switched run."""
         return find_good_pair(self.situation)
 
     @property
@@ -146,7 +146,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td, relative to the reference run; None if they are unknown."""
+        """Bounds of the mean energy after td relative to the reference run [-]; None if they are unknown."""
         return bound_mean_energy(self.situation, self.candidate)
 
 
@@ -157,7 +157,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is reused if it belongs to the same td.
+    """Judge one pair (tr, td); the situation ``earlier`` is reused if it belongs to the same td.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def _check_order(tr: float, td: float) -> None:
 
 
 class AcceptableWindow(NamedTuple):
-    """Window from ``start`` to ``end`` of acceptable tr [time]; ``share`` is its share of the flight up to td [-]."""
+    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` is its fraction of the flight up to td."""
 
     start: float
     end: float
@@ -260,7 +260,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """Estimate of the motion after td on basis "energy"; None on other bases."""
+        """Estimate of the motion after td if the basis is "energy"; None if the basis is another."""
         if self.situation.basis != "energy":
             return None
         return estimate_time_after(
@@ -284,7 +284,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable tr on basis "energy", in which all tr are equally good; None on other bases."""
+        """Windows of acceptable, equally good tr if the basis is "energy"; None if the basis is another."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -308,7 +308,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The clearly better pair, if its residual shows that it is not poor; otherwise None."""
+        """The better pair, if it is clearly better than the recommended pair and its residual is good; else None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
@@ -316,7 +316,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
-        """Decision on the better pair by the rules of ``verify``, without another better pair; None without a pair."""
+        """Verdict on the better pair by the rules of ``verify``; None if there is no better pair."""
         better = self.better_pair
         if better is None:
             return None
@@ -364,7 +364,7 @@ class PairSuggestion(AnswerAtTd):
 
 
 def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
-    """Return the verdict on the recommended pair, with a better pair from a search if the pair is not good."""
+    """Return the verdict on the recommended pair; if that pair is not good, search for a better pair first."""
     decision = answer.decision
     if decision is None or decision.reaches(GOOD) or answer.better_pair:
         return decision
@@ -382,7 +382,7 @@ def suggest_in_history(
 def suggest_at(
     situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
 ) -> PairSuggestion:
-    """Rank the candidates for tr in a given situation, recommend one, and search for a better td.
+    """Rank the candidates for tr at the td of a situation, recommend one, and search for a better td.
 
     ``ranked`` lists the ranked candidates, at least up to the recommended one, if they are already known.
     """
@@ -407,14 +407,14 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair of the nearest energy peak in the flight that has one; None if no peak has one.
+    """Return the recommended pair of the nearest energy peak that has one, within the flight; None if no peak has one.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # If the end of the flight is unknown, no td after the given td is tried.
+    # If the end of the flight is unknown, times after the given td are not tried.
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -440,7 +440,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair that is not poor: the recommended tr for this td, or the pair of the nearest better td."""
+    """Return a pair whose grade is not "poor": the recommended pair at this td or at the nearest better td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -451,7 +451,7 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _is_level_refused(situation: Situation) -> bool:
-    """Return True if no tr can have the energy level at td, because that level is negative or too high.
+    """Return True if no tr can match the energy level at td, because that level is negative or too high.
 
     This test saves time, since noise makes thousands of such peaks.
     """
@@ -470,7 +470,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
-    """Examine the same record at another td in the same way as at a td that the user gives."""
+    """Examine the same record at another td, in the same way as at a td given by the user."""
     # The oscillator is fitted again, but the slow search for the reason of a refusal is omitted.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
@@ -526,7 +526,7 @@ def suggest_in_run(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
-    """Choose tr for ``td``, or both times if ``td`` is a window (low, high) or None (the longest flight) [time].
+    """Choose tr for ``td``, or both times if ``td`` is a time range (low, high) or None (the longest flight) [time].
 
     If ``with_better`` is False, no better td than a given td is determined.  If td is chosen, no flight is assumed to
     begin before ``since``, and ``times`` are tried in addition to the energy peaks, by default an even grid [time].
@@ -564,7 +564,7 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair of a reference run, with the errors and the argument ``earlier`` of `verify_in_history`."""
+    """Judge one pair (tr, td) of a reference run; ``earlier`` and the errors are those of `verify_in_history`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
     return _add_health(verdict, reference.run)
@@ -595,7 +595,7 @@ def compare_with(
         verdict,
         switched=comparison,
         computed=switched.history,
-        # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
+        # The pair is inadmissible if the switched run deviates too much, whatever the reference run shows.
         admissible=verdict.admissible and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,
         cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
@@ -603,7 +603,7 @@ def compare_with(
 
 
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
-    """Add the health of the run, with its warnings, in the rigid window or else in the flight up to td.
+    """Add the health of the run and its warnings, for the rigid window or, without a pair, for the flight up to td.
 
     The time after td does not matter for the choice.
     """

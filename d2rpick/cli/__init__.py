@@ -72,7 +72,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click passes the argument
-        """Return the help option. The option of click would be translated by files on the user's system."""
+        """Return d2rpick's own help option, because files on the user's system could translate that of click."""
         return self._help
 
     @cached_property
@@ -185,7 +185,7 @@ class _CommandGroup(Documented, click.Group):
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # Writing to os.devnull keeps Python from reporting an error when it closes the stream at exit.
+            # Writing to os.devnull prevents Python from reporting an error when it closes the stream at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
@@ -234,7 +234,7 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        # Each command of the examples is on one line.
+        # Each command in the examples is on one line.
         lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(

@@ -517,7 +517,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Before a file is opened, refuse to copy a deck that is not given, and to write a card that switches no parts."""
+    """Refuse, before a file is opened, to copy a deck that is not given, or to write a card that switches no parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -529,7 +529,7 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy of the deck, and check the copy by the history.
+    """Write the copy of the deck, and check the copy against the history.
 
     Returns
     -------

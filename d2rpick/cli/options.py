@@ -67,7 +67,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 # Options that write files; if the command is repeated, these files already exist.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
-# Key in the context of click: True if only the settings are to be shown.
+# Key in the context of click for a flag that is True if only the settings are to be shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -80,7 +80,7 @@ class Command(Documented):
     """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line. Options that neither it nor the environment sets come from the settings file."""
+        """Read the command line. Options set neither there nor in the environment come from the settings file."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         ctx.meta[_SETTINGS_ONLY] = _ASKS_FOR_SETTINGS in args
@@ -109,7 +109,7 @@ class Command(Documented):
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the help of the options in groups by their subject."""
+        """Write the help of the options in groups by subject."""
         shown_options = (
             parameter
             for parameter in self.get_params(ctx)
@@ -140,8 +140,8 @@ class Command(Documented):
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
-        # numpy is imported before the modules of a run, because its import makes many nested calls.
-        # In Python 3.11, nested calls are slow if they repeatedly cross the end of a piece of the stack.
+        # numpy is imported here, at a small call depth, because its import makes many nested calls.
+        # In Python 3.11, nested calls are slow if they repeatedly cross the end of a chunk of the call stack.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401  only the import matters
         try:
@@ -151,14 +151,14 @@ class Command(Documented):
 
 
 def _make_optional(parameter: click.Parameter) -> click.Parameter:
-    """Return a copy of a parameter that need not be given."""
+    """Return a copy of a parameter that is not required."""
     optional = copy(parameter)
     optional.required = False
     return optional
 
 
 class Either(click.Option):
-    """An option that excludes others. If one of these is on the command line, its environment variable is ignored."""
+    """An option that excludes others. If one of them is on the command line, its environment variable is ignored."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -327,7 +327,7 @@ def make_click_option(
 def make_time_option(
     name: str, text: str, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that is a time, or a window of time."""
+    """Make an option of one command for a time, or for a time window."""
     pair = arguments.get("pair", False)
     required = arguments.pop("required", False)
     return make_click_option(
@@ -362,7 +362,7 @@ def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def open_judging_run(request: Request) -> Run | None:
-    """Open the history with which cards are judged; return None if no history is given."""
+    """Open the history by which cards are judged; None if no history is given."""
     if not request.history:
         return None
     # Imported here to keep start-up fast.

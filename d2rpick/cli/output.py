@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 OBJECTION = 1
 # Smallest width of a terminal for which a result is wrapped [columns].
 _NARROWEST: Final = 40
-# Output formats by the suffix of the file name.
+# Output formats, keyed by the suffix of the file name.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # Suffixes of files that users may expect for a report, but that are not supported.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
@@ -49,7 +49,7 @@ _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Options whose names differ from the arguments that messages name in backticks.
+# Options whose names differ from those of the arguments that messages name in backticks.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -129,7 +129,7 @@ class Output:
 
     @property
     def file(self) -> str | None:
-        """Name of the file for the result, or None if the result goes to stdout."""
+        """Name of the file for the result; None if the result goes to stdout."""
         return None if self.output_file == "-" else self.output_file
 
     @property
@@ -138,7 +138,7 @@ class Output:
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Return an output that protects these inputs; raise D2RPickError if it would overwrite a file."""
+        """Return an output that protects these inputs; raise D2RPickError if it would overwrite one of them."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -178,7 +178,7 @@ class Output:
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
-        """Return what a form of output shows in addition to the answer."""
+        """Return what an output form shows in addition to the answer."""
         from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
@@ -199,7 +199,7 @@ class Output:
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
-        """Write the figure and the page if they are requested."""
+        """Write the figure and the page if the user requests them."""
         if self.plot:
             from d2rpick.report import figures
 
@@ -215,7 +215,7 @@ class Output:
     def finish_by_verdict(
         self, decision: VerdictOnPair | None, min_quality: str
     ) -> None:
-        """Exit with code 1 if there is no pair, or its grade is below ``min_quality``; a message names this limit."""
+        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``, which a message names."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -282,7 +282,7 @@ class Output:
             click.echo(content, nl=False)
 
     def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Write the card of an answer with its cautions; return False if there is no card or a window fails."""
+        """Write the card of an answer with its cautions; return False if there is no card or if a window fails."""
         if judged_card is None:
             self.content(b"")
             return False
@@ -291,7 +291,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print what a reader omitted, and the warnings."""
+        """Print notes on what a reader omitted, and the warnings."""
         if self.quiet:
             return
         listed_cautions = list(cautions)
@@ -326,7 +326,7 @@ class Output:
 
 
 def _check_report(name: str | None) -> None:
-    """Raise D2RPickError if the file name of a report implies a format other than HTML."""
+    """Raise D2RPickError if the file name of a report implies another format than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
@@ -405,7 +405,7 @@ def encode_text(text: str) -> bytes:
 
 
 def replace_arguments(message: str) -> str:
-    """Replace the argument names in a message with the options that set them.
+    """Replace the argument names in a message with the options that set these arguments.
 
     Examples
     --------

@@ -245,7 +245,7 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _make_sarif_help(rule: Rule) -> dict[str, str]:
-    """Return the fix of a rule, and where the documentation explains the rule.
+    """Return the fix of a rule, and the place in the documentation that explains the rule.
 
     SARIF requires an absolute address as ``helpUri``.  The documentation has none, so the text names its page and
     anchor.
@@ -329,7 +329,7 @@ def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str
 
 
 def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
-    """Yield the windows in groups of the same cards, times and verdict."""
+    """Yield the windows in groups with the same cards, times and verdict."""
     alike = (
         (
             (window.cards, window.unit.kind, window.tr, window.td, window.decision),
@@ -396,7 +396,7 @@ def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
 
 
 def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
-    """Return the verdict on a pair, its reason and its cure by key; None if the pair was not judged."""
+    """Return the verdict on a pair, its reason and its cure, keyed by JSON key; None if the pair was not judged."""
     return {
         "verdict": decision and decision.verdict,
         "verdict_reason": decision and decision.reason,
@@ -481,7 +481,7 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display, with ``/`` and no undecodable bytes, relative to ``root`` if it is inside it."""
+    """Return a path for display, with ``/`` and no undecodable bytes; it is relative to ``root`` if inside it."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up
@@ -494,7 +494,7 @@ def _format_path(path: str, root: str) -> str:
 
 
 def _make_sarif_locations(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
-    """Return a location in a file as SARIF defines it."""
+    """Return a location in a file in the form that SARIF defines."""
     from urllib.parse import quote
 
     uri = f"{'file://' * displayed.startswith('/')}{quote(displayed)}"
@@ -508,7 +508,7 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Replace the characters of a string that XML 1.0 cannot contain or a terminal does not show."""
+    """Replace the characters of a string that XML 1.0 cannot contain or that a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
@@ -574,7 +574,7 @@ def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
 
 
 def _format_example(title: str, example: Example, width: int) -> Iterator[str]:
-    """Return the lines of an example deck, of its included files, and of the files that it is checked against."""
+    """Return the lines of an example deck, of its included files, and of the files with which it is compared."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.wrap_command(

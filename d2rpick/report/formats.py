@@ -1,4 +1,4 @@
-"""List the forms in which each result can be written, and write it.
+"""List the output forms of each result, and write results in these forms.
 
 Each result has a module in this folder.  It is imported only to write the result, so that ``--help`` starts fast.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")
-# The forms in which each result can be written; the first one is the default.
+# The output forms of each result; the first form is the default.
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "suggestion": (*PLAIN, "ndjson", "value"),
     "plan": (*PLAIN, "ndjson", "value"),

@@ -161,9 +161,9 @@ _SPARE: Final = (
     "rotation error [deg]",
     "energy scatter",
 )
-# Displayed verdicts on parts.
+# Displayed verdicts on parts, keyed by verdict.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
-# Displayed names of the sets.
+# Displayed names of the sets, keyed by set name.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
     "all but what moves": "all eligible parts but loose ones",
@@ -172,7 +172,7 @@ _SET_NAMES: Final = {
 
 
 def is_limited_by_no_part(part_set: PartSet) -> bool | None:
-    """Return True if no deformable part limits the time step."""
+    """Return True if no deformable part limits the time step; None if this is unknown."""
     return None if part_set.step_growth is None else isinf(part_set.step_growth)
 
 
@@ -276,7 +276,7 @@ def as_csv(answer: Parts, _: DisplayOptions) -> str:
 
 
 def as_value(answer: Parts, _: DisplayOptions) -> str:
-    """Return the part ids of the recommended set in the form of ``--part``; nothing if no set is recommended."""
+    """Return the part ids of the recommended set in the form of ``--part``; empty if no set is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
@@ -336,7 +336,7 @@ def build_set_table(
 
 
 def _format_position_error(part_set: PartSet) -> str:
-    """Return the position error of a set, and the assumption behind it."""
+    """Return the position error of a set as text, with the assumption behind it."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
@@ -401,7 +401,7 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def _explain_no_part(answer: Parts) -> str:
-    """Return why no set was compared: of some parts it is unknown whether they can be switched, or none can be."""
+    """Explain why no set was compared: for some parts it is unknown whether they can be switched, or none can be."""
     unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
     if not unknown_rows:
         return "no part can be switched"
@@ -453,7 +453,7 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
 
 
 def format_count(count: int, noun: str) -> str:
-    """Return a count with its noun, in the plural unless it is 1."""
+    """Return a count with its noun, in the plural unless the count is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, WrittenDeck
 
 
-# For each status of a window, in which run the parts can be switched in it.
+# Run in which the parts can be switched in a window, keyed by status of the window.
 _RUN: Final = {
     "supported": "next run",
     "re-plan": "later run",
@@ -48,7 +48,8 @@ _POSITION: Final = (
     "position_error_body",
     "position_error_assumes",
 )
-# Columns that are omitted first if the table would be too wide.
+# _OUT_OF_PLACE: name of the column with the position error.
+# _SPARE: columns that are omitted first if the table is too wide.
 _OUT_OF_PLACE: Final = "out of place"
 _SPARE: Final = ("margin", "CPU time", _OUT_OF_PLACE, "error")
 
@@ -405,7 +406,7 @@ def build_flight_table(plan: RunPlan) -> tuple[list[str], list[list[tables.Cell]
 
 
 def format_pair_error(row: PlannedFlight) -> str | None:
-    """Return the name and value of the error of a window's pair."""
+    """Return the name and value of the error of a window's pair, as text; None if it is unknown."""
     best = row.candidate
     if best is None:
         return None
@@ -419,7 +420,7 @@ def format_pair_error(row: PlannedFlight) -> str | None:
 
 
 def _format_place_error(row: PlannedFlight) -> str | None:
-    """Return the position error of a rigid body at td [length]."""
+    """Return the position error of a rigid body at td as text [length]."""
     best = row.candidate
     if best is None or best.position_error is None:
         return None

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions
 
-# A line of text lists at most this number of windows of acceptable tr.
+# Largest number of windows of acceptable tr that are listed in a line of text.
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
-# A candidate and the decision on it.
+# JSON fields of a candidate and of the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
     keys.NO_PARTS,
@@ -48,14 +48,14 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# _SPARE: columns that are omitted first if the table of candidates would be too wide.
+# _SPARE: columns that are omitted first if the table of candidates is too wide.
 # _IN_FULL: columns that are shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 
 
 def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
-    """Return each candidate with the decision on it."""
+    """Return each candidate together with the decision on it."""
     return [
         (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
     ]
@@ -137,7 +137,7 @@ def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
 def _select_shown_candidates(
     answer: PairSuggestion, display: DisplayOptions
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the first candidates; empty columns are left out."""
+    """Return the first candidates without empty columns, as header and rows."""
     head, rows = tables.select_known_columns(
         *build_candidate_table(answer, display.limit)
     )
@@ -175,7 +175,7 @@ def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def _judge_better_pair(answer: PairSuggestion, better: Pair) -> str:
-    """Return the better pair with its verdict; one that cannot be used is named only as such."""
+    """Describe the better pair with its verdict, or state that it cannot be used."""
     decision = answer.decision_on_better
     if decision is None:
         return f"{_format_times(better)}: {describe_improvement(answer, better)}"
@@ -257,7 +257,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_position_error(best: Candidate, *, deck: bool) -> str:
-    """Return the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
+    """Describe the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` shows which do)" if taken and not deck else ""
@@ -271,7 +271,7 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Return the rigid time given up for a better level or residual, and the improvement."""
+    """Describe the rigid time given up for a better level or residual, and the improvement."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:
@@ -289,7 +289,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the share of all."""
+    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the sum of all."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
@@ -358,14 +358,14 @@ def build_candidate_table(
 def list_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> list[tuple[str, str]]:
-    """Return the reasons of the verdicts on the listed candidates, each with its number in the table."""
+    """Return the reasons for the verdicts on the listed candidates, each with its number in the table."""
     return list_numbered_reasons(_number_candidate_reasons(answer, listed))
 
 
 def _number_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> dict[str, int]:
-    """Number the reasons why the verdicts on the listed candidates are not better."""
+    """Number the reasons that explain why the listed candidates are not rated higher."""
     return number_reasons(map(answer.decision_on, listed))
 
 

@@ -98,7 +98,7 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return whether the switched run agrees with the reference run, with the limits, after the name of the line."""
+    """Return the name of a line, and whether the switched run agrees with the reference run, with the limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
@@ -169,7 +169,7 @@ def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return each measure by its key, with the prefix ``switched_`` for a switched run. Reasons are one text."""
+    """Return the measures, keyed by name, with the prefix ``switched_`` for a switched run. Reasons form one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -206,7 +206,7 @@ def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
 
 
 def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """Return how far the switched run deviates from the reference after td, as (name, text) pairs."""
+    """Return how far the switched run deviates from the reference run after td, as (name, text) pairs."""
     error = switched.momentum_error
     displacement = switched.displacement
     if error is None:
@@ -221,7 +221,7 @@ def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
 
 
 def _format_comparison(switched: Comparison) -> list[str]:
-    """Return the lines that compare the switched run with the reference."""
+    """Return the lines that compare the switched run with the reference run."""
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, compare_values(switched)),
@@ -231,7 +231,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures of the switched run by name; empty if there is no switched run."""
+    """Return the measures of the switched run, keyed by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

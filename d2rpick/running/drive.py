@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after the other."""
+"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after another."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
-# With 5 times the time step, a rigid leg costs a few percent of a deformable leg, and its contacts stay visible.
+# Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
+# With 5 times the time step, a rigid engine run costs a few percent of a deformable one and resolves its contacts.
 _STEP_RATIO: Final = 5.0
-# A flight that is too short to be switched is reported if it lasts for at least this share of the required time [-].
+# Smallest duration of a reported flight that is too short to be switched, as a fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without output after which the silence of the solver is reported [s].
@@ -63,7 +63,7 @@ class Driven:
     why : str
         Why the wait has this length.
     saved : (float or None, float or None)
-        Saved share of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
+        Saved fraction of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
     """
 
     run: OpenedRun
@@ -117,14 +117,14 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed, or how many ``seconds`` the starter has run before the first leg."""
+        """Describe the engine run being computed, or how many ``seconds`` the starter has taken before the first."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
         return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
-        """Compute leg after leg up to the end of the run.
+        """Compute one engine run after another, up to the end of the run.
 
         Raises
         ------
@@ -140,7 +140,7 @@ class Driver:
                 self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
-            # An earlier driver may have begun the leg, and the solver has finished it since.
+            # An earlier driver may have begun the engine run, and the solver may have finished it since.
             begun = self.journal.records[-1].get("order") == [*order]
             if not begun or self._find_problem(order):
                 self._start(order)
@@ -152,7 +152,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg. If its restart file is damaged, go back leg by leg to a complete restart file."""
+        """Choose the next engine run. If its restart file is damaged, go back to a complete restart file."""
         legs = self.journal.legs
         order = choose_next_leg(legs, self.limits)
         if order is None or not legs or self.solver.whole(order.number - 1):
@@ -161,14 +161,14 @@ class Driver:
         return self._choose_next()
 
     def _go_back(self, reason: str) -> None:
-        """Undo the last leg, so that it is computed again."""
+        """Discard the last engine run, so that it is computed again."""
         legs = self.journal.legs
         self.journal.add("back", legs=len(legs) - 1)
         start = legs[-1].order.start
         self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
-        """Write the engine file of a leg and start the engine."""
+        """Write the engine file of an engine run, and start the engine."""
         number = order.number
         self.solver.check_room(number)
         self.solver.clear(number)
@@ -201,7 +201,7 @@ class Driver:
             raise
 
     def _find_problem(self, order: Order) -> str:
-        """Return why a leg has failed; "" if it ended normally, with complete restart files and a complete history."""
+        """Return why an engine run has failed; empty if it ended normally, with complete restart files and history."""
         number = order.number
         if not self.solver.ended_well(number):
             return f"the solver failed: {self.solver.last_words(number)}; continue with --resume"
@@ -213,12 +213,12 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Write to the journal that a leg has failed; if its files are incomplete, it is computed again once.
+        """Record in the journal that an engine run has failed; if its files are incomplete, it is computed again once.
 
         Raises
         ------
         D2RPickError
-            If the solver reported an error, or the leg has failed before.
+            If the solver reported an error, or the engine run has failed before.
         """
         has_failed = self.journal.has_failed
         self.journal.add("failed", leg=order.number)
@@ -230,7 +230,7 @@ class Driver:
         )
 
     def _end(self, order: Order) -> None:
-        """Write the findings of a leg to the journal."""
+        """Record the findings of an engine run in the journal."""
         number, legs = order.number, self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
@@ -251,7 +251,7 @@ class Driver:
 
 
 def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
-    """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+    """Return the largest time step of a rigid engine run, from the smallest mean step of the deformable ones [time]."""
     if not order.rigid:
         return None
     steps = [
@@ -262,7 +262,7 @@ def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | N
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
-    """Return the longest waiting time of the legs that ended before a given time and in which parts vibrated [time]."""
+    """Return the longest waiting time of the earlier engine runs in which parts vibrated [time]."""
     waits = [
         leg.findings.wait or 0.0
         for leg in legs
@@ -272,7 +272,7 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
 
 
 def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
-    """Return the findings at the end of a leg from the evidence of its joined legs."""
+    """Return the findings at the end of an engine run from the evidence of all engine runs that are joined to it."""
     if order.rigid:
         return LegFindings(contact=evidence.find_contact())
     history = evidence.history
@@ -300,7 +300,7 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose as tr the start of a leg if it is in flight and has more internal energy than the end; else the end."""
+    """Choose tr: the start of an engine run in flight if it has more internal energy than the end, else the end."""
     start = max(order.start, history.start)
     falls = history.energy_at(start) > history.energy_at(history.end)
     if falls and order.start >= max(free, order.switch_after):
@@ -324,7 +324,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, except the legs that were undone by a restart from an earlier time."""
+        """Computed engine runs, except those that were undone by a restart from an earlier time."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":
@@ -337,7 +337,7 @@ class Journal:
 
     @property
     def has_failed(self) -> bool:
-        """True if the next leg has failed before."""
+        """True if the next engine run has failed before."""
         events = [record["event"] for record in self.records]
         return [event for event in events if event != "started"][-1:] == ["failed"]
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Paths of the programs in an installation, and their arguments.
+# Paths of the programs in an installation, and their arguments, keyed by program.
 _PROGRAMS: Final = {
     "starter": (
         ("bin/starter_gf", "exec/starter_linux64_gf"),
@@ -45,12 +45,12 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# Number of bytes read from the end of a listing to find errors; in a starter's listing, much output follows them.
+# Number of bytes read from the end of a listing to find errors; in a starter listing, much output follows them.
 _LISTING_SIZE: Final = 1 << 22
 # An error in a listing: its first line and the next three.
 _ERROR_LINES: Final = r".*\*\* ERROR.*(?:\n.*){0,3}"
 _MOST_LINES: Final = 8
-# A restart file is complete if it has at least this share of the size of the starter's restart file.
+# Smallest size of a complete restart file, as a fraction of the size of the starter's restart file [-].
 _WHOLE: Final = 0.98
 # _TIME_TO_STOP: time that a solver is given to stop by itself [s].
 # _PAUSE: time between two checks whether the solver has stopped [s].
@@ -65,7 +65,7 @@ class Commands(NamedTuple):
     threads: int = 1
 
     def words(self, program: str, deck: str) -> list[str]:
-        """Split the command that starts a program on a deck as a shell would.
+        """Split the command that starts a program on a deck, as a shell would.
 
         Raises
         ------
@@ -84,13 +84,13 @@ class Commands(NamedTuple):
                 f"--{program} {template!r}: cannot be split into words ({error})"
             ) from None
         if "/" in words[0]:
-            # The path is made absolute because the program is started in another folder.
+            # The path is made absolute, because the program is started in another folder.
             words[0] = str(Path(words[0]).absolute())
         words = [word.replace("{threads}", str(self.threads)) for word in words]
         return [word.replace("{deck}", deck) for word in words]
 
     def make_environment(self) -> dict[str, str]:
-        """Return the environment of the programs: the current one with the variables of an installation."""
+        """Return the environment of the programs: the current one, with the variables of an installation."""
         environment = {"OMP_NUM_THREADS": str(self.threads), "OMP_STACKSIZE": "400m"}
         libraries = os.environ.get("LD_LIBRARY_PATH", "")
         if home := os.environ.get(_HOME):
@@ -99,7 +99,7 @@ class Commands(NamedTuple):
         return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
     def missing(self) -> str:
-        """Return the first program that cannot be started, or "" if all can be started."""
+        """Return the first program that cannot be started; empty if all can be started."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -135,7 +135,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int | None:
-    """Lock a file and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
+    """Lock a file, and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -160,21 +160,21 @@ class Solver:
         self._signal = 0  # Number of the signal that ended the last process, or 0.
 
     def file(self, number: int, suffix: str) -> Path:
-        """Return the path of a file of a leg; leg 0 is the starter."""
+        """Return the path of a file of an engine run; number 0 is the starter."""
         return self.folder / f"{self.name}_{number:04d}{suffix}"
 
     def history(self, number: int) -> Path:
-        """Return the path of the time history of a leg."""
+        """Return the path of the time history of an engine run."""
         return self.folder / f"{self.name}T{number:02d}"
 
     def clear(self, number: int) -> None:
-        """Remove the files of an earlier leg with this number."""
+        """Remove the files of an earlier engine run with the given number."""
         for path in self.folder.glob(f"{self.name}_{number:04d}[._]*"):
             path.unlink()
         self.history(number).unlink(missing_ok=True)
 
     def start(self, program: str, number: int) -> None:
-        """Start the starter, whose leg ``number`` is 0, or the engine on a leg.
+        """Start the solver for an engine run: the starter if its ``number`` is 0, otherwise the engine.
 
         Raises
         ------
@@ -231,24 +231,24 @@ class Solver:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:
-        """Return the time since the solver last wrote anything [s]."""
+        """Return the time since the solver last wrote output [s]."""
         now = time.time()
         paths = self.folder.glob(f"{self.name}*")
         times = [path.stat().st_mtime for path in paths if path.exists()]
         return max(0.0, now - max(times, default=now))
 
     def ended_well(self, number: int) -> bool:
-        """Return True if the listing of a leg reports its normal end."""
+        """Return True if the listing of an engine run reports a normal end."""
         return "NORMAL TERMINATION" in self._read_end(number, ".out")
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
+        """Return cycles and CPU time [s] of an engine run; None if its listing does not contain them."""
         path = str(self.file(number, ".out"))
         timing = find_radioss_timing(path, read_tail(path, _TAIL_SIZE))
         return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
-        """Return True if a leg, or the starter (number 0), has left complete restarts of all domains.
+        """Return True if an engine run, or the starter (number 0), has left complete restart files of all domains.
 
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -264,7 +264,7 @@ class Solver:
         return bool(starter_restarts)
 
     def read_times(self, number: int) -> Samples:
-        """Return the times of the states in the history of a leg [time]; none if the history cannot be read."""
+        """Return the times of the states in the history of an engine run [time]; empty if it cannot be read."""
         path = self.history(number)
         try:
             return TimeHistory(path.read_bytes(), str(path)).time
@@ -272,7 +272,7 @@ class Solver:
             return np.empty(0)
 
     def started_well(self) -> bool:
-        """Return True if the starter has ended without an error and left a complete restart."""
+        """Return True if the starter has ended without an error and left a complete restart file."""
         has_error = re.search(_STARTER_ERROR, self._read_end(0, ".out"))
         return self.whole(0) and not has_error
 
@@ -281,25 +281,24 @@ class Solver:
         listing = self._read_end(number, ".out", _LISTING_SIZE)
         errors = _split_lines("\n".join(re.findall(_ERROR_LINES, listing)))
         printed = _split_lines(self._read_end(number, ".log") or listing)
-        lines = (
-            errors[:_MOST_LINES] or printed[-_MOST_LINES:] or ["nothing was printed"]
-        )
+        text = " | ".join(errors[:_MOST_LINES] or printed[-_MOST_LINES:])
+        words = [text or "nothing was printed"]
         free = shutil.disk_usage(self.folder).free
         if free < self._measure_largest_restart():
             # A solver that cannot write its files prints no error.
-            lines[0] = f"the disk is full, {free / 1e6:.3g} MB are free; {lines[0]}"
+            words.insert(0, f"the disk is full, {free / 1e6:.3g} MB are free")
         if self._signal:
-            lines[0] = f"ended by signal {self._signal}; {lines[0]}"
-        return make_printable(" | ".join(lines))
+            words.insert(0, f"ended by signal {self._signal}")
+        return make_printable("; ".join(words))
 
     def keep(self, numbers: Collection[int]) -> None:
-        """Remove all restarts except those of these legs and of the starter."""
+        """Remove all restart files except those of the given engine runs and of the starter."""
         for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
             for restart in self._find_restarts(number):
                 restart.unlink()
 
     def check_room(self, number: int) -> None:
-        """Raise D2RPickError if the disk has no room for the restart files of leg ``number`` and of the next one."""
+        """Raise D2RPickError if the disk has no room for the restart files of an engine run and of the next one."""
         needed = 2 * self._measure_largest_restart()
         free = shutil.disk_usage(self.folder).free
         if free < needed:
@@ -309,11 +308,11 @@ class Solver:
             )
 
     def _read_end(self, number: int, suffix: str, size: int = _TAIL_SIZE) -> str:
-        """Return the last bytes of a file of a leg as text; "" if it is missing."""
+        """Return the last bytes of a file of an engine run as text; empty if the file is missing."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
 
     def _find_restarts(self, number: int | None = None) -> list[Path]:
-        """Return the restart files of a leg, one for each domain, or those of all legs."""
+        """Return the restart files of an engine run, one for each domain, or those of all engine runs."""
         leg = "*" if number is None else f"{number:04d}"
         return [*self.folder.glob(f"{self.name}_{leg}_*.rst")]
 
@@ -334,7 +333,7 @@ def _has_its_name(restart: Path) -> bool:
 
 
 def _raise_stack_limit() -> None:
-    """Raise the stack limit to the system's maximum, because the solver keeps large arrays on the stack."""
+    """Raise the stack limit to the maximum of the system, because the solver keeps large arrays on the stack."""
     import resource
 
     _, limit = resource.getrlimit(resource.RLIMIT_STACK)

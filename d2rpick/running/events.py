@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.running.evidence import GrowingEvidence
     from d2rpick.running.witness import Quiet
 
-# tr is good if the internal energy is above its recent minimum by at least this share of its recent range [-].
+# Smallest height of the internal energy above its recent minimum at a good tr, as a fraction of its recent range [-].
 # In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak at least 90 %.
 _HIGH: Final = 0.75
 _RIGID: Final = (
@@ -42,7 +42,7 @@ class Event(NamedTuple):
 
 
 def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
-    """Return all events in the order in which they were seen.
+    """Return all events in the order in which they were detected.
 
     The events of a run so far are the first ones of the whole run.  The evidence keeps those of past flights.
 
@@ -60,7 +60,7 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(flight, evidence)
     for start, seen_at, end in evidence.find_rigid_times():
-        # No switch is advised if the parts are rigid already.
+        # No switch is advised if the parts are already rigid.
         events = [
             event
             for event in events
@@ -95,7 +95,7 @@ def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event
 
 
 def _describe_start(flight: Quiet) -> Event:
-    """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
+    """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
     landing = "landing time unknown"
     if flight.level is not None:
         landing = f"on level ground it lands at about {flight.level:.4g}"
@@ -109,7 +109,7 @@ def _describe_start(flight: Quiet) -> Event:
 
 
 def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise when to switch in a flight: at once if nothing vibrates, else while the internal energy is high.
+    """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
     """
@@ -150,7 +150,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise ""."""
+    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise empty."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

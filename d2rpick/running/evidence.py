@@ -7,7 +7,7 @@ has the same flights as the finished one.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.running.events import Event
     from d2rpick.running.inner_motion import MovingParts
 
 # Largest number of states from which gravity is determined.
@@ -48,16 +47,16 @@ class GrowingEvidence:
         before: float = 0.0,
     ) -> None:
         self.given = given
-        # Events of past flights, keyed by the start of the flight and the time at which it was seen.
-        self.decided: dict[tuple[float, float], tuple[Event, ...]] = {}
+        # Events of past flights, keyed by the start of the flight and the time at which it was detected.
+        self.decided: dict[tuple[float, float], tuple[Any, ...]] = {}
         self.motion = InnerMotion(of_deck, before)
-        # Evidence of each set of parts, followed by that of the model if its momentum or contact energy is written.
+        # Evidence for each set of parts, followed by that for the model if its momentum or contact energy is known.
         self.witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, keyed by its parts; None stands for the whole model.
+        # Evidence that still grows, keyed by its parts; the key of the whole model is None.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
-        # For each state, True if the part momenta add up to the momentum of the model.
+        # True for each state at which the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
 
     def take(self, states: History, history: History) -> None:
@@ -79,7 +78,7 @@ class GrowingEvidence:
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, contact: Balance | None
     ) -> MovingParts:
-        """Append part momenta to the evidence of all sets of parts that may fly together, and return the moving parts.
+        """Append part momenta to the evidence for all sets of parts that may fly together, and return the moving parts.
 
         The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
         when a rigid body has absorbed some parts.
@@ -97,7 +96,7 @@ class GrowingEvidence:
         for members in dict.fromkeys(_list_sets(momenta)):
             columns = _make_columns(members, momenta, contact)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
-            # Once other parts move, the contact energy includes their contacts and is no longer used.
+            # Once other parts move, the contact energy includes their contacts, and is no longer used.
             other_parts = np.delete(has_moved, members, axis=1)
             columns[other_parts.any(axis=1), 1] = np.nan
             columns[~are_complete, 2:] = np.nan
@@ -117,7 +116,7 @@ class GrowingEvidence:
         columns: Samples,
         written: tuple[Momenta | None, Balance | None],
     ) -> None:
-        """Append states to the evidence of a set of parts; after states without momentum, the evidence starts again.
+        """Append states to the evidence for a set of parts; after states without momentum, the evidence starts again.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
@@ -209,7 +208,7 @@ class GrowingEvidence:
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
-        """Return the start of the force-free time that lasts up to a time; if there are no states, return the time."""
+        """Return the start of the force-free time that lasts up to a time; if there are no states, return that time."""
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
@@ -218,7 +217,7 @@ class GrowingEvidence:
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return all force-free times that ended after ``since``, before they were seen as flights."""
+        """Return all force-free times that ended after ``since`` without being detected as flights [time]."""
         for witness in self.witnesses:
             if self._going_on.get(witness.parts) is witness:
                 return tuple(pause for pause in witness.pauses if pause[1] > since)

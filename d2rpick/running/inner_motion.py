@@ -1,4 +1,4 @@
-"""Determine the waiting time (the force-free time that shows a flight) from the inner oscillations of the body.
+"""Determine the waiting time (the force-free time that shows a flight) from the internal oscillations of the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
     # Slices of the latest states, each with the columns of the parts that move in it.
     MovingParts = Sequence[tuple[slice, Sequence[int]]]
 
-# A change of velocity is an oscillation if it exceeds this share of the velocity range so far [-].
+# Smallest velocity change that is an oscillation, as a fraction of the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: share of the change in a half period, at each end, that is not used to measure the half period [-].
-# _INNER_TIME: share of half its period that a harmonic motion takes for the middle part of the change [-].
+# _INNER: fraction of the change in a half period that is omitted at each end to measure the half period [-].
+# _INNER_TIME: fraction of half its period that a harmonic motion takes for the middle part of the change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# An oscillation is treated as a rotation of the body if its mean force is below this share of the largest so far [-].
+# Largest mean force of an oscillation treated as body rotation, as a fraction of the largest mean force so far [-].
 _ROTATION: Final = 0.05
-# A change within fewer states than this is treated as a jump, not as an oscillation.
+# Smallest number of states in an oscillation; a change within fewer states is treated as a jump.
 _FEWEST_STATES: Final = 4
-# A part oscillates only if its relative velocity exceeds this share of the velocity of all parts [-].
+# Smallest relative velocity of a part that oscillates, as a fraction of the velocity of all parts [-].
 _AT_REST: Final = 1e-3
-# The end of an oscillation is unknown once it lasts this many times as long as the longest earlier half period [-].
+# Ratio to the longest earlier half period above which the end of an oscillation is unknown [-].
 _MUCH_LONGER: Final = 2.0
-# _LONGEST_FREE: a longer free oscillation, in half periods according to the deck, is a rotation of the body [-].
-# _LONGEST_PUSHED: a longer oscillation under a load, in half periods according to the deck, is a rotation too [-].
+# _LONGEST_FREE: largest duration of a free oscillation that is no body rotation, in half periods of the deck [-].
+# _LONGEST_PUSHED: largest duration of an oscillation under load that is no body rotation, in half periods [-].
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# A given waiting time must be at least this share of half the longest period [-], which is uncertain by 10 %.
+# Smallest waiting time that the user may give, as a fraction of half the longest period [-], uncertain by 10 %.
 _EXACT: Final = 0.9
-# Parts with less than this share of the mass are ignored [-], because they hardly move the other parts.
+# Smallest mass fraction of parts that are considered [-], because lighter parts hardly move the other parts.
 _HEAVY: Final = 0.05
 
 
@@ -61,7 +61,7 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an inner ``motion``, from ``begin`` to ``end``, detected at the time ``seen_at`` [time].
+    """Half a period of an internal ``motion``, from ``begin`` to ``end``, detected at the time ``seen_at`` [time].
 
     ``half`` is half of its period [time], ``strength`` its mean change by time.
     """
@@ -82,20 +82,20 @@ class _Motion:
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
-        # The value is True once an unforced oscillation was seen.
+        # True once an unforced oscillation has been detected.
         self.has_free_swing = False
-        # The first half period has no duration; it ends when the motion is first seen.
+        # The first half period has no duration; it ends when the motion is first detected.
         self._swings: list[_HalfPeriod] = []
-        # The columns are time, value, and the smallest change that is an oscillation.
+        # The columns contain time, value, and the smallest change that is an oscillation.
         self._columns = GrowingColumn()
         self._highest, self._lowest = RunningMaximum(), RunningMaximum()
-        # State at the last turning point, state at the extreme since then, and direction (1 rising, -1 falling).
+        # State at the last extremum, state at the extreme value since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,) and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
+        """Append states (k,), and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
         ranges = self._highest.add(values) + self._lowest.add(-values)
         limits = np.maximum(_SWING * ranges, least_swing)
         rows = self._columns.add(np.column_stack([time, values, limits]))
@@ -117,7 +117,7 @@ class _Motion:
                 self._sign = -self._sign
 
     def _begin(self, rows: Samples) -> None:
-        """Begin to follow the motion, which is first seen at the last of its states."""
+        """Begin to follow the motion, which is first detected at the last of its states."""
         distance = np.abs(rows[:, 1] - rows[-1, 1])
         self._extreme = len(rows) - 1
         self._turn = self._extreme - int(np.argmax(distance[::-1]))
@@ -126,7 +126,7 @@ class _Motion:
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
-        """Measure the half period from the last turning point to the extreme value, as detected ``now``."""
+        """Measure the half period from the last extremum to the extreme value, as detected ``now``."""
         time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
         low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
         high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
@@ -160,7 +160,7 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the inner motion so far, as the ``wait`` for which it asks; None if there is none.
+    """The longest half period of the internal motion so far, as the ``wait`` for which it asks; None if there is none.
 
     ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
     the longest swing, even if a force pushed the swing [time].
@@ -173,7 +173,7 @@ class _Longest(NamedTuple):
 
 
 class InnerMotion:
-    """The inner motion up to each state of a record, and the longest half period that it has shown.
+    """The internal motion up to each state of a record, and the longest half period that it has shown.
 
     ``of_deck`` is the deck's waiting time, ``before`` that of earlier flights [time].
     """
@@ -191,7 +191,7 @@ class InnerMotion:
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
-        # Longest half periods in the order in which they became known.
+        # Longest half period of any part so far, with one entry for each time at which it grew.
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
@@ -265,14 +265,14 @@ class InnerMotion:
             so_far[-1] = longest
 
     def longest(self, now: float) -> Wait | None:
-        """Return the longest half period known ``now``, from the deck or from the record so far."""
+        """Return the longest half period known at the time ``now``, from the deck or from the record so far."""
         wait = self._get_longest(now).wait
         if wait is None or wait.time <= self._least_time:
             return self._least
         return wait
 
     def longest_swing(self, now: float) -> float:
-        """Return the longest half period known ``now``, even if a push lengthened it [time]."""
+        """Return the longest half period known at the time ``now``, even if a push lengthened it [time]."""
         return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:

@@ -11,6 +11,7 @@ from d2rpick.base.errors import FormatError, HistoryError
 from d2rpick.choice.parts.deck_of_run import add_surroundings
 from d2rpick.choice.question import Reference
 from d2rpick.histories.opening import Source, open_sources
+from d2rpick.histories.resuming import join_resume_points
 from d2rpick.histories.source import open_files, open_source
 from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import wait_of_deck
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.resuming import ResumePoint
 
-# A record with fewer states than this is read completely each time, because early results may still change.
+# Number of states below which a record is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
@@ -44,7 +45,7 @@ class Looks:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self.evidence = GrowingEvidence(*self._waits)
         self.record = GrowingRecord()
-        # For each file, where the next read continues; {} if the next read covers all states.
+        # Place in each file where the next read continues; empty if the next read covers all states.
         self.resume_points: dict[str, ResumePoint] = {}
         # All files of the last read.
         self._names: frozenset[str] = frozenset()
@@ -62,7 +63,7 @@ class Looks:
         return bool(states.time.size)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Read the new states, and report whether they follow those read before.
+        """Read the new states, and return them with True if they follow the states read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -90,7 +91,7 @@ class Looks:
         return new_states, follows
 
     def _read_whole(self, names: Sequence[str]) -> History:
-        """Read all states of the files; errors as `new_states`."""
+        """Read all states of the files, with the errors of `new_states`."""
         sources = open_files(names)
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)
@@ -99,7 +100,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, including known states, and new files completely.
+        """Read the last states of each file, including known states, and read new files completely.
 
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
         be read from its resume point, as when it was written anew.
@@ -125,19 +126,20 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in the files, except an incomplete last state, and where to continue in the files.
+        """Return the history in the files, without an incomplete last state, and where to continue in each file.
 
         The places are {} if the format of a file is always read as a whole.
         """
         run = open_sources(sources, self._selection)
-        points = run.find_resume_points()
+        points = join_resume_points(
+            database.find_resume_points() for database in run.databases
+        )
         whole_states = [*sources]
         for number, source in enumerate(sources):
             if source.name in points:
                 data = source.data[: points[source.name].end]
                 whole_states[number] = source._replace(data=data)
         if whole_states != [*sources]:
-            run = open_sources(whole_states, self._selection)
-            points = run.find_resume_points()
+            return self._open(whole_states)
         run = add_surroundings(run, self._inventory)
         return Reference.of(run, self._selection).history, points
