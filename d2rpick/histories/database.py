@@ -15,7 +15,6 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, list_names
-from d2rpick.histories.contact_forces import join_contact_forces
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
 from d2rpick.histories.names import (
@@ -329,6 +328,9 @@ class Legs:
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts and rigid walls that all restart segments have."""
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.contact_forces import join_contact_forces
+
         legs = [
             {force.name: force for force in leg.contact_forces} for leg in self._legs
         ]
