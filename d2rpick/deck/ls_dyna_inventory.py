@@ -194,7 +194,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         _build_parts(deck, parts, mesh),
         mesh.elements,
         mesh.coordinates,
-        notes,
+        (*notes, *_note_switching_cards(deck)),
         parts.all_known and not notes,
         joints=place_nodes(joints.found, mesh.table),
         ties=joints.unknown,
@@ -206,6 +206,15 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
             deck, parts, (ids, coordinates, codes)
         ).placed(mesh.table),
     )
+
+
+def _note_switching_cards(deck: Deck) -> Iterator[str]:
+    """Yield a note on the first card with which the deck already switches parts."""
+    for card in deck.named("DEFORMABLE_TO_RIGID")[:1]:
+        yield (
+            f"{card.at}: the deck already switches parts with *{card.name}; remove its switching cards before you add "
+            "others"
+        )
 
 
 def find_shared_nodes(
@@ -304,7 +313,7 @@ def _list_notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
         if not _is_readable(card)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in deck.unread
     )
     for block in deck.encrypted:

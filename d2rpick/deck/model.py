@@ -228,7 +228,8 @@ class Inventory:
     coordinates : array
         Shape (nodes, 3), NaN for a node without coordinates [length].
     notes : tuple of str
-        Cards that cannot be read; ``complete`` is False if elements or parts may be missing because of them.
+        Cards that cannot be read, and a card that already switches parts; ``complete`` is False if elements or parts
+        may be missing.
     joints, switched : tuple of Joint
         Connections of parts that share no nodes, and rigid bodies that exist to be switched.
     ties : tuple of str

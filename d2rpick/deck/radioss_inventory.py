@@ -218,7 +218,7 @@ def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:
         if has_mesh(block)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in run.deck.unread
     )
     if starter.moved:

@@ -85,7 +85,7 @@ class SwitchHeader(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class SwitchSet:
-    """One switching card after reading: its header, if it has one, and its parts.
+    """One switching card: its header, if it has one, and its parts.
 
     ``count_problem`` says how lines and counts differ, or is empty. ``values`` are all its fields.
     """

@@ -29,7 +29,7 @@ _MOST_STEPS: Final = 25
 # _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Smallest ratio of squared lever arms about an axis to the others for which its rotation can be determined [-].
+# Smallest squared lever arms about an axis whose rotation can be found, as a fraction of those about the others [-].
 _ALONG_AXIS: Final = 1e-6
 # Numbers of periods per record that are tried as start values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))

@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
 # _STAYS: smallest fraction of its length that a window retains if it is treated as unchanged [-].
-# _STANDS: largest shift of the other end of a window that shrinks at one end only, as a fraction of its length [-].
+# _STANDS: largest shift of the unchanged end of a window that shrinks at its other end, as a fraction of it [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # Smallest misfit of a vibration in the middle half of a window, as a fraction of the misfit in the whole window [-].
 # For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.

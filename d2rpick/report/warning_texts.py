@@ -55,8 +55,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "no-flight": Explanation(
             "Nothing in the record shows when the load ends, so d2rpick cannot recommend a tr.",
-            "If the parts never fly, do not switch them. If they fly, give the end of the load with --after, or write the "
-            "part momenta in the next run.",
+            "If the parts never fly, do not switch them. If they fly, give the end of the load with --after, or write "
+            "the part momenta in the next run.",
         ),
         "no-free-flight": Explanation(
             "The parts do not fly at this td: a force, a support or a prescribed motion acts on them. The warning "
@@ -251,7 +251,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor. It uses the history instead.",
+            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor, and uses the history instead. Or "
+            "the deck already contains switching cards, which the answer does not consider.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(

@@ -71,7 +71,7 @@ MAX_STRUCTURE: Final = 0.02
 _DEVIATIONS: Final = 3.0
 # Excess of the covariance over that of white noise at which the structure is certain [standard deviations].
 _BEYOND_DOUBT: Final = 6.0
-# Ratio of the structure with few samples to MAX_STRUCTURE above which all samples would refuse the fit [-].
+# Ratio of the misfit structure in few samples to MAX_STRUCTURE above which a fit to all samples would fail [-].
 _BEYOND_STRUCTURE: Final = 2.0
 
 
@@ -147,7 +147,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Refine the start values and return the best result; None if each leaves more than ``worst`` of the variance."""
+    """Refine the start values and return the best result; None if all leave more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
 _MOST_SHARED: Final = 0.9
 # Assumed standard deviation of the frequency of a line before the fit, in cycles over the record [-].
-# The assumption before the fit limits the uncertainty of lines that the fit made from noise.
+# The assumption before the fit limits the uncertainty of spurious lines that are fitted to noise.
 _LOOSE_TURNS: Final = 0.5
 
 

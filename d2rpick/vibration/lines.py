@@ -151,7 +151,7 @@ def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # White noise has the same power at all frequencies, so the highest frequencies show its level.
+    # White noise has the same power at all frequencies, so the highest frequencies show the noise level.
     noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(

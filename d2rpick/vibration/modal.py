@@ -81,7 +81,7 @@ _FEWEST_PER_PERIOD: Final = 2.4
 # Number of times per period of the highest-frequency relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Number of parts into which the intervals of these evaluations are divided for linear interpolation of the energy.
+# Number of parts of each interval between evaluated deformations, for linear interpolation of the energy.
 _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
@@ -349,7 +349,7 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return elastic energies at ``time`` and at finer times, and the factor of tr in the coherence."""
+        """Return elastic energies at ``time`` and at finer times, and the part of the coherence that depends on tr."""
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )

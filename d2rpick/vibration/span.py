@@ -41,7 +41,7 @@ _MARKS = 0.87
 # _LEAST_PERIODS: smallest number of periods of a window that an oscillator describes; fewer may fit by chance.
 # _MOST: smallest fraction of the fitted samples in a window that an oscillator describes [-].
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# Largest ratio of the misfit without the ends of a window to that with them if the ends are not part of a flight [-].
+# Largest ratio of misfits without and with the ends of a window at which the ends are not part of the flight [-].
 _MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
 # _SHARE_OFF: limit of the mean error as a fraction of the vibration energy [-].

@@ -173,7 +173,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # The times at which the energy crosses this level are included, because it may exceed its limit between samples.
+    # Times at which the energy is just below its limit are included, because it may exceed the limit between samples.
     highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]

@@ -381,7 +381,7 @@ def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
     """Yield the index of a data frame or series, if it consists of numbers."""
     title = _read_attribute_text(index.attrs.get("name"))
-    # "N." is the pickled form of None.
+    # The pickled form of None is "N.".
     title = "index" if title in ("", "N.") else title
     if index.dtype.kind in "iuf" and index.ndim == 1:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
