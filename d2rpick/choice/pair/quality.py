@@ -504,12 +504,12 @@ def _list_causes_of_record(
         )
     states = count_states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        states_text = f"the record has {states:.3g} states per period"
+        states_text = f"the energy has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
                 f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
-                kind=f"the record has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
+                kind=f"the energy has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )
     return tuple(causes)
