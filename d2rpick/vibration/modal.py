@@ -86,7 +86,9 @@ _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that show a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that show a flight, relative to the energy range [-].
-_LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
+# _EXACT: modes are exact if their errors are below this share of these limits [-].
+# _SLOW_TOO: modes that do not complete a cycle are distinguished from other slow changes below this share [-].
+_LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are not linear [-].
@@ -113,6 +115,9 @@ _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
+# _LIKE_LEVEL: a static energy falls as the vibration does if the rest of its variation is below this share [-].
+# _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
+_LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
 # Assumed number of lines that are hidden in the misfit.
 _HIDDEN_LINES: Final = 12
 
@@ -264,16 +269,14 @@ class ModalVibration:
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record ten times better than required."""
-        return self._predicts_within(0.1)
+        """Return True if the modes predict the record much better than required."""
+        return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
         """Return True if the error of the modes, apart from white noise, is below a share of the acceptable error."""
-        white = 1 - self.systematic
-        structure = self.doubts.misfit * np.sqrt(self.systematic)
-        missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
-        most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
-        return self.signed and structure < most_left and missed < most_missed**2
+        doubts = self.doubts
+        follows = _predicts_within(share, doubts.missed, doubts.misfit, self.systematic)
+        return self.signed and follows
 
     @property
     def told(self) -> str:
@@ -467,7 +470,8 @@ class ModalVibration:
         """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
-        that the misfit can hide, and by the static energy itself.
+        that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
+        with slow decays, so what the first part of the record says of it is another interpretation.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
@@ -476,10 +480,19 @@ class ModalVibration:
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        if self.has_slow_mode:
+            first = self.of_first_part.residual_squared(tr, td)
+            shifts.append(first - squared)
         return (
             np.max([none, *np.negative(shifts)], axis=0),
             np.max([none, *shifts], axis=0),
         )
+
+    @cached_property
+    def has_slow_mode(self) -> bool:
+        """Return True if the energy of a mode does not complete a cycle in the window."""
+        window = float(self.time[-1] - self.time[0])
+        return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
     @property
     def is_ambiguous(self) -> bool:
@@ -526,6 +539,11 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
+    misfit = prediction.spectrum.error / prediction.swing
+    systematic = _correlate_neighbours(prediction.spectrum.rest)
+    if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
+        # What is no sum of lines, as under friction, changes slowly beside them.
+        prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
     window = float(time[0]), float(time[-1])
@@ -557,6 +575,20 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     return (
         held > (1 - _MOST_NEGATIVE) * needed and internal.doubts.beyond < _MOST_BEYOND
     )
+
+
+def _predicts_within(
+    share: float, missed: float, misfit: float, systematic: float
+) -> bool:
+    """Return True if the error of lines, apart from white noise, is below a ``share`` of the acceptable error.
+
+    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states have the share ``systematic`` of the misfit in common.
+    """
+    white = 1 - systematic
+    structure = misfit * np.sqrt(systematic)
+    systematically_missed = missed**2 - 2 * white * misfit**2
+    most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
+    return bool(structure < most_left and systematically_missed < most_missed**2)
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
@@ -616,6 +648,11 @@ def _read(
     with_static = replace(plain, is_mode=is_mode, no_static=False)
     half = with_static.level_of_modes(grid.time) / 2
     static = spectrum.mean.at(grid.time) - half
+    if not kinetic:
+        hidden_pairs = _measure_hidden_pairs(static, 2 * half, noise, systematic)
+        plain = replace(plain, hidden_pairs=hidden_pairs)
+        with_static = replace(with_static, hidden_pairs=hidden_pairs)
+        static = static - hidden_pairs * half
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
     half_of_all = plain.level_of_modes(grid.time) / 2
@@ -677,6 +714,29 @@ def _read(
         max((third.second for third in springs), default=0.0),
         "kinetic energy" if kinetic else "internal energy",
     )
+
+
+def _measure_hidden_pairs(
+    static: Samples, level: Samples, noise: float, systematic: float
+) -> float:
+    """Return the vibration energy that falls as the ``level`` does but has no lines, relative to the level [-].
+
+    The lines of two modes with equal rates and opposite phases cancel each other, so their energy looks static.  A
+    static energy stays as it is, while that of modes decays with all others.
+    """
+    fallen = level - np.mean(level)
+    variance = float(np.mean(fallen**2))
+    if variance <= (_RESOLVED * float(np.mean(level))) ** 2:
+        return 0.0
+    share = float(np.mean(fallen * static)) / variance
+    left = static - np.mean(static) - share * fallen
+    shared = min(systematic, _MOST_SHARED)
+    states = static.size * (1 - shared) / (1 + shared)
+    scatter = noise / np.sqrt(states * variance)
+    is_seen = share > ABOVE_SCATTER * scatter
+    if not is_seen or float(np.mean(left**2)) > (_LIKE_LEVEL * share) ** 2 * variance:
+        return 0.0
+    return 2 * max(min(share, float(np.min(static / level))), 0.0)
 
 
 def _find_most_hidden(rest: Samples) -> float:
