@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
+from d2rpick.vibration.hidden_energy import find_most_hidden, measure_hidden_pairs
 from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
@@ -115,11 +116,6 @@ _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
-# _LIKE_LEVEL: a static energy falls as the vibration does if the rest of its variation is below this share [-].
-# _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
-_LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
-# Assumed number of lines that are hidden in the misfit.
-_HIDDEN_LINES: Final = 12
 
 
 class Doubts(NamedTuple):
@@ -442,6 +438,14 @@ class ModalVibration:
         """
         return self.half_width(tr, td) / 4
 
+    @property
+    def fallen(self) -> float:
+        """Return by how much the static energy falls in the window, relative to the mean vibration energy [-]."""
+        ends = self.time[[0, -1]]
+        level = self.reading.level_of_modes(ends)
+        static = self.reading.spectrum.mean.at(ends) - level / 2
+        return float((static[0] - static[1]) / max(np.mean(level) / 2, 1e-300))
+
     @cached_property
     def _phase_share(self) -> float:
         """Return the share of R^2 that depends on the phases of all modes at td [-]."""
@@ -476,7 +480,7 @@ class ModalVibration:
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
         if not (self.reading.no_static or self.is_ambiguous):
-            hidden = _find_most_hidden(self.reading.spectrum.rest)
+            hidden = find_most_hidden(self.reading.spectrum.rest)
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
@@ -569,7 +573,11 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """Return True if the kinetic energy may be used, since plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
+    Plastic flow and dampers add to it.  If the static energy falls instead, a deformation relaxes, which moves the
+    parts although it does not vibrate.
     """
+    if internal.fallen > _NO_STATIC:
+        return False
     held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
     needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
     return (
@@ -649,7 +657,7 @@ def _read(
     half = with_static.level_of_modes(grid.time) / 2
     static = spectrum.mean.at(grid.time) - half
     if not kinetic:
-        hidden_pairs = _measure_hidden_pairs(static, 2 * half, noise, systematic)
+        hidden_pairs = measure_hidden_pairs(static, 2 * half, noise, systematic)
         plain = replace(plain, hidden_pairs=hidden_pairs)
         with_static = replace(with_static, hidden_pairs=hidden_pairs)
         static = static - hidden_pairs * half
@@ -662,7 +670,7 @@ def _read(
         and not kinetic
         and excess < _AMBIGUOUS * float(np.mean(half_of_all))
     )
-    hidden = _find_most_hidden(remainder)
+    hidden = find_most_hidden(remainder)
     unresolved = share * mean < hidden / 2
     no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
     if ambiguous and not all(stretch.is_exact for stretch in stretches):
@@ -714,39 +722,6 @@ def _read(
         max((third.second for third in springs), default=0.0),
         "kinetic energy" if kinetic else "internal energy",
     )
-
-
-def _measure_hidden_pairs(
-    static: Samples, level: Samples, noise: float, systematic: float
-) -> float:
-    """Return the vibration energy that falls as the ``level`` does but has no lines, relative to the level [-].
-
-    The lines of two modes with equal rates and opposite phases cancel each other, so their energy looks static.  A
-    static energy stays as it is, while that of modes decays with all others.
-    """
-    fallen = level - np.mean(level)
-    variance = float(np.mean(fallen**2))
-    if variance <= (_RESOLVED * float(np.mean(level))) ** 2:
-        return 0.0
-    share = float(np.mean(fallen * static)) / variance
-    left = static - np.mean(static) - share * fallen
-    shared = min(systematic, _MOST_SHARED)
-    states = static.size * (1 - shared) / (1 + shared)
-    scatter = noise / np.sqrt(states * variance)
-    is_seen = share > ABOVE_SCATTER * scatter
-    if not is_seen or float(np.mean(left**2)) > (_LIKE_LEVEL * share) ** 2 * variance:
-        return 0.0
-    return 2 * max(min(share, float(np.min(static / level))), 0.0)
-
-
-def _find_most_hidden(rest: Samples) -> float:
-    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
-
-    None of them is higher than the highest line of the rest, and together they are no more than the rest.
-    """
-    highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
-    most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
-    return float(2 * _HIDDEN_LINES * min(highest, most_together))
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:

@@ -180,6 +180,23 @@ def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     assert "kinetic energy" in kinetic.told
 
 
+def test_the_kinetic_energy_does_not_decide_where_a_deformation_relaxes() -> None:
+    """A deformation that creeps back moves the parts, and hardly any of its energy is kinetic."""
+    structure = LinearStructure.draw(4, 3)
+    kinetic = require(
+        identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True)
+    )
+    relaxing = 40.0 * np.exp(-TIME / 2.0)
+    falling = require(identify_modal(TIME, structure.elastic_energy(TIME) + relaxing))
+    assert not falling.signed
+    assert confirm_by_kinetic_energy(falling, kinetic) is falling
+    rising = require(
+        identify_modal(TIME, structure.elastic_energy(TIME) - relaxing + 40.0)
+    )
+    assert not rising.signed
+    assert confirm_by_kinetic_energy(rising, kinetic) is kinetic
+
+
 @pytest.mark.parametrize("stretch", [0.3, 1.0])
 def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
     structure = LinearStructure.draw(11, 3)
