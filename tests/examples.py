@@ -73,6 +73,11 @@ def find_sessions(text: str) -> Iterator[Session]:
         )
 
 
+def make_anchor(heading: str) -> str:
+    """Return the anchor that GitHub gives a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
 def run_shown_command(command: str) -> str:
     """Run a command line and return its output."""
     _, *args = shlex.split(command.replace("\\\n", ""))

@@ -24,6 +24,7 @@ from tests.examples import (
     find_blocks,
     find_languages,
     find_sessions,
+    make_anchor,
     read_page,
     round_numbers,
     run_shown_command,
@@ -36,11 +37,6 @@ MAP = "docs/README.md"
 LONGEST_README = 700  # words of prose that can be read in five minutes
 # Each language has a test below, or shows nothing that can be run.
 KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
-
-
-def make_anchor(heading: str) -> str:
-    """Return the anchor that GitHub gives a heading."""
-    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
 def list_anchors(page: Path) -> set[str]:

@@ -36,7 +36,7 @@ class Answer:
     come from no file are written as ``<weights in memory>``.
     """
 
-    # Some answers store the command as a field, others compute it as a property.
+    # Some answers store the command as a field, whereas others compute it as a property.
     if TYPE_CHECKING:
 
         @property
@@ -44,13 +44,13 @@ class Answer:
             """The command line that gives the same answer; it begins with the name of the command."""
 
     cautions: tuple[Caution, ...]
-    kind: ClassVar[str]  # Name of the answer in the table of output forms.
+    kind: ClassVar[str]  # Name of the kind of answer in the table of output forms.
     # Names of the attributes that the short form of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, result: Any, **further_fields: Any) -> Self:
-        """Make the public answer from a result of the core; ``cautions`` follow the cautions of the result."""
+        """Make the public answer from a result of the core; ``cautions`` are appended to the cautions of the result."""
         values = {field.name: getattr(result, field.name) for field in fields(result)}
         values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
         return cls(**values, **further_fields)
@@ -75,19 +75,20 @@ class Answer:
         return self.cautions
 
     def text(self, form: str, display: DisplayOptions) -> str:
-        """Return the answer in a form of the command line."""
+        """Return the answer as text in one of the output forms of the command line."""
         from d2rpick.report.formats import write
 
         return write(self.kind, form, self, display)
 
     def to_json(self) -> str:
-        """Return the JSON document of the command line; it names its schema."""
+        """Return the JSON document that the command line prints; it names its schema."""
+        from d2rpick.api.option_names import replace_arguments
         from d2rpick.report.formats import DisplayOptions
 
-        return self.text("json", DisplayOptions(self.command))
+        return replace_arguments(self.text("json", DisplayOptions(self.command)))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON document of the command line as a dictionary."""
+        """Return the JSON document that the command line prints, as a dictionary."""
         import json
 
         document: dict[str, Any] = json.loads(self.to_json())
@@ -136,7 +137,7 @@ class Paged(Answer):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RunAnswer(Paged):
-    """An answer about one run, with the question and the times of the command line.
+    """An answer about one run, together with the question and the times on the command line.
 
     ``run`` is the run that was asked about.
     """
@@ -192,7 +193,7 @@ class RunAnswer(Paged):
     def _add_card(
         self, context: PageContext, cards: Cards, situation: Situation, tr: float
     ) -> PageContext:
-        """Add the card of a tr to a page, or the reason why it cannot be printed."""
+        """Add the card for a tr to a page, or the reason why the card cannot be printed."""
         from d2rpick.choice.judged_card import complete_printing, print_pair
         from d2rpick.deck.printed_card import Printing
 

@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
-    # False means no deck, even if the folder of the run contains a deck.
+    # False means that no deck is used, even if the folder of the run contains one.
     Deck = Path | Literal[False]
     Parts = str | int | Iterable[str | int]
     # A number in the unit of the run, or a string with a unit, such as 64ms.
     Time = float | str
 
-# A message shows at most this number of characters of a wrong value.
+# Largest number of characters of a wrong value that a message shows.
 _LONGEST_SHOWN: Final = 60
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
-    """Return a finite number within its limits, or raise TypeError or ValueError.
+    """Return a finite number within its limits; raise TypeError or ValueError for anything else.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def check_flag(name: str, value: object, default: bool) -> bool:
 
 
 def check_windows(name: str, value: object) -> list[tuple[float, float]]:
-    """Return time windows; None gives no windows.
+    """Return the given time windows as a list; None gives an empty list.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Explain how to write a number that has a decimal comma; empty for other strings.
+    """Explain how to write a number that was given with a decimal comma; empty for other strings.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Explain how to write a time that has a unit; empty for other strings."""
+    """Explain how to write a time that was given with a unit; empty for other strings."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -155,7 +155,7 @@ def suggest_without_unit(value: object) -> str:
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
-    """Explain how to write a share, or a time, that is given in percent; empty for other strings.
+    """Explain how to write a fraction, or a time, that was given in percent; empty for other strings.
 
     Examples
     --------
@@ -177,12 +177,12 @@ def suggest_without_percent(value: object, *, is_time: bool) -> str:
 def check_optional_number(
     name: str, value: object, limits: Number = TIME
 ) -> float | None:
-    """Return a finite number within its limits, or None if no number is given."""
+    """Return a finite number within its limits; None if no number is given."""
     return None if value is None else check_number(name, value, limits)
 
 
 def check_time_window(name: str, value: object) -> tuple[float, float] | None:
-    """Return a time window, the lower time first, or None if no window is given.
+    """Return a time window with the lower time first; None if no window is given.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         return ()
     from d2rpick.histories.names import Part
 
-    # A Part has a number and a title.
+    # A `Part` has both a number and a title.
     single = isinstance(value, str | int | Part) or is_whole_number(value)
     if single:
         listed = [value]
@@ -244,7 +244,7 @@ def list_part_names(name: str, value: Parts | None) -> tuple[str, ...]:
 
 
 def list_rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Return the ids of rules or their prefixes; a string is a single id.
+    """Return the ids of rules, or prefixes of ids, as a tuple; a string is a single id.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def list_rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ..
 
 
 def check_whole_number(name: str, value: object, low: int) -> int:
-    """Return a whole number of at least ``low``.
+    """Return a whole number that is at least ``low``.
 
     Examples
     --------
@@ -280,7 +280,7 @@ def check_whole_number(name: str, value: object, low: int) -> int:
 
 
 def list_paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
-    """Return the names of files; a string is a single name.
+    """Return the names of files as a tuple; a string is a single name.
 
     Examples
     --------
@@ -311,7 +311,7 @@ def check_run(name: str, run: object) -> None:
     """Raise TypeError unless the argument is a run returned by `read`."""
     from d2rpick.api.tables import is_table
 
-    # Imported here because the module of the class imports this module.
+    # The class is not imported here, because its module imports this module.
     if not (hasattr(run, "files") and hasattr(run, "overview")):
         if isinstance(run, str | os.PathLike):
             description = repr(run)
@@ -396,7 +396,7 @@ def read_choosing(choosing: Choosing | Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_two_whole_numbers(name: str, value: object, low: int) -> tuple[int, int]:
-    """Return two whole numbers of at least ``low``."""
+    """Return two whole numbers that are at least ``low``."""
     if not _is_pair(value):
         raise TypeError(
             f"{name} is {_format_wrong_value(value)}, a pair of numbers was expected"
@@ -419,7 +419,7 @@ def _check_oscillator(value: object) -> Oscillator | None:
 
 
 def check_weights(value: object) -> Any:
-    """Return weights, the name of a file with weights, or None if no weights are given."""
+    """Return weights or the name of a file with weights; None if no weights are given."""
     if value is None:
         return None
     if isinstance(value, str | os.PathLike):
@@ -490,7 +490,7 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
-    """Return the windows of the rigid restart segments in a journal; of equal numbers, the last segment is used."""
+    """Return the windows of the rigid restart segments in a journal; of equal segment numbers, the last is used."""
     import json  # Imported here to keep start-up fast.
 
     # Each segment consists of its number, True if it is rigid, its start and its end.

@@ -32,10 +32,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import CostModel, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories import run as histories
+    from d2rpick.report.formats import RepeatedQuestion
 
 
 class RunQuestion(NamedTuple):
-    """A question: the opened run, the selected energy, and the settings by which it is judged.
+    """A question: the opened run, the selected energy, and the settings by which the run is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
     deck.  ``on_card`` are parts that only the card contains.
@@ -49,7 +50,7 @@ class RunQuestion(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    # The value is False if the deck was found to belong to another run.
+    # False if the deck was found to belong to another run.
     of_this_run: bool = True
 
     @property
@@ -59,10 +60,21 @@ class RunQuestion(NamedTuple):
 
     @property
     def unused_deck(self) -> str | None:
-        """The deck that the user named, if it belongs to another model and is not used; otherwise None."""
+        """The deck that the user named, if it is not used because it belongs to another model; otherwise None."""
         if self.of_this_run or self.request.deck_in_folder:
             return None
         return self.request.deck
+
+    @property
+    def repeated(self) -> RepeatedQuestion:
+        """Words of the command line with which other commands ask about the same run."""
+        if self.unused_deck:
+            question = self.request.repeat(without=("deck", "weights", "step_ratio"))
+            return question._replace(
+                options=("--no-deck", *question.options),
+                judging=(*question.judging, "--no-deck"),
+            )
+        return self.request.repeat()
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -109,7 +121,7 @@ def make_request(
 
 
 def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
-    """Open the run that the request names, or other files with the same options."""
+    """Open the run named in the request, or other files with the same options."""
     from d2rpick.api.runs import Run, find_folder
     from d2rpick.histories import opening
 
@@ -120,14 +132,14 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if ``--part`` applies only to the card, because the history is a table, which has no parts."""
+    """Return True if ``--part`` applies only to the card, because the history is a table without parts."""
     return bool(request.energy) or not run.parts
 
 
 def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> RunQuestion:
-    """Select the requested energy of a run, and add the data of its deck.
+    """Select the requested energy of a run, and add the data from its deck.
 
     Parameters
     ----------
@@ -165,7 +177,7 @@ def ask_run(
     if card_alone and is_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
-        request.selection()  # The call raises an error if both an energy and parts are named.
+        request.selection()  # Raises an error if the user names both an energy and parts.
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
@@ -188,7 +200,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or only the weights; return None if neither is requested.
+    """Read the deck with its weights, or only the weights; None if neither is requested.
 
     Raises
     ------
@@ -210,7 +222,7 @@ def read_cost_model(request: Request) -> CostModel | None:
 def complete_selection(
     run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection of parts with the recommended set, and with the springs of the deck that have energies.
+    """Complete a selection of parts with the recommended set, and with those springs of the deck that have energies.
 
     Raises
     ------
@@ -234,7 +246,7 @@ def complete_selection(
 
 
 def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
-    """Refuse the recommended set together with other parts, or if there is no deck."""
+    """Refuse the recommended set if other parts are named too, or if there is no deck."""
     if has_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError(

@@ -19,7 +19,7 @@ UNJOINED: Final = "parts-not-joined"
 def collect_objections(
     card: PrintedCard, question: RunQuestion, parts: int
 ) -> Iterator[Caution]:
-    """Yield the findings of ``check`` in a deck with the card; if there is no deck, name what is unknown.
+    """Yield the findings of ``check`` for a deck with the card; without a deck, name what is unknown.
 
     ``parts`` is the number of parts that the card switches by their ids.
     """

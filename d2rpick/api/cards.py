@@ -77,14 +77,14 @@ def _check_option(name: str, value: Any, option: Option) -> Any:
 
 
 def list_solvers() -> Sequence[str]:
-    """Return the names of the solvers whose input can be printed."""
+    """Return the names of the solvers for which d2rpick can print input."""
     from d2rpick.deck.printing import SOLVERS  # Imported here to keep start-up fast.
 
     return tuple(SOLVERS)
 
 
 def explain_unknown_solver(name: object) -> str:
-    """Return the message for a name that is not a solver; it suggests the most similar name."""
+    """Return the message about a name that is not a solver; the message suggests the most similar name."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
@@ -94,7 +94,7 @@ def explain_unknown_solver(name: object) -> str:
 
 @dataclass(eq=False, repr=False)
 class Cards:
-    """Options of a card, shared by all commands that print one."""
+    """Options of a card, which all commands that print a card share."""
 
     solver: str | None = make_option(
         "Solver whose input is printed.  [default: solver that wrote the history, else ls-dyna]",
@@ -157,7 +157,7 @@ class Cards:
 
     @property
     def given(self) -> list[str]:
-        """Names of the given options, except the solver."""
+        """Names of the options that were given, except the solver."""
         return [
             name
             for name in list_options(Cards)
@@ -165,7 +165,7 @@ class Cards:
         ]
 
     def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
-        """Return the options of the card, completed by the given parts to switch."""
+        """Return the options of the card, completed by the parts to switch if these are given."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_id_ranges("--node", self.node))
@@ -194,7 +194,7 @@ class Cards:
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def complete(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Complete the options of a card from the deck of the run, unless they are given.
+        """Complete the options of a card that are not given from the deck of the run.
 
         Notes say which rigid bodies the deck lacks.
 
@@ -315,12 +315,12 @@ class JudgedCard(NamedTuple):
 
     @property
     def verified(self) -> bool:
-        """True if all windows on the card are verified."""
+        """True if all windows on the card have been verified."""
         return all(verdict.verified for verdict in self.verdicts)
 
     @property
     def worst(self) -> Decision | None:
-        """Verdict on the worst of the judged windows; None if none was judged."""
+        """Verdict on the worst of the judged windows; None if no window was judged."""
         return min(
             (verdict.decision for verdict in self.verdicts),
             key=lambda decision: GRADES.index(decision.grade),
@@ -329,7 +329,7 @@ class JudgedCard(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """True if all windows are admissible and have at least the grade ``min_quality``."""
+        """Return True if all windows are admissible and have at least the grade ``min_quality``."""
         return all(
             verdict.decision.reaches(verdict.situation.settings.min_quality)
             for verdict in self.verdicts
@@ -343,7 +343,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card of windows, and judge the windows with the times as printed: as in `verify`, or by ``judge``.
+    """Print the card for windows, and judge the windows with the times as printed: as in `verify`, or by ``judge``.
 
     Raises
     ------
@@ -458,7 +458,7 @@ def card(
 def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card of windows; if there is a run, judge them with the times as printed."""
+    """Print the card for windows; if there is a run, judge the windows with the times as printed."""
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -476,7 +476,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the card to print if there is no history; raise ArgumentError if an option is missing."""
+    """Return the options of the card if there is no history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

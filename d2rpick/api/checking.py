@@ -57,7 +57,7 @@ class Findings(Answer, Checks):
 
     @property
     def decks(self) -> tuple[str, ...]:
-        """Names of the main decks."""
+        """Names of the main decks that were checked."""
         return tuple(result.deck for result in self.results)
 
     @property
@@ -196,7 +196,7 @@ def find_findings(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that d2rpick wrote, with the configuration nearest to it."""
+    """Check a deck that d2rpick wrote, with the configuration nearest to it in the folders."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -208,9 +208,9 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result of each deck and each run once; a folder stands for its main decks."""
+    """Yield the result for each deck and each run once; a folder stands for its main decks."""
     visited: set[str] = set()
-    # The result is cached, because it asks the system for each parent folder.
+    # Results are cached, because the function asks the system for each parent folder.
     real_folder = cache(os.path.realpath)
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118  pathlib is slow for many decks
@@ -257,7 +257,7 @@ def _list_decks(name: str) -> list[str] | DeckError:
 
 
 def _find_restarts(decks: Sequence[str]) -> dict[str, list[str]]:
-    """Return the small restarts of each LS-DYNA deck, if they are the only other decks in its folder."""
+    """Return the small restart decks of each LS-DYNA deck, if they are the only other decks in its folder."""
     small = [deck for deck in decks if is_restart(deck)]
     legs: dict[str, list[str]] = {}
     for restart in small:
@@ -279,7 +279,7 @@ def _check_one(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck by the configuration nearest to it. An error is returned, so that other decks are checked."""
+    """Check a deck with the configuration nearest to it. An error is returned, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)

@@ -68,7 +68,7 @@ class PartTable(Paged, sets_of_parts.Parts):
         )
 
     def plot(self) -> Figure:
-        """Draw the energies of the parts that have the largest energies, and the flights."""
+        """Draw the flights, and the energies of the parts with the largest energies."""
         from d2rpick.report.figures_choice import draw_parts
 
         return draw_parts(self)
@@ -84,7 +84,7 @@ def parts(
     td: Time | None = None,
     **choosing: Unpack[Choosing],
 ) -> PartTable:
-    """Determine which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+    """Determine which parts of a run may be switched and what sets of parts save, as ``d2rpick parts`` does.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def parts(
 def compare_parts(
     run: Run, request: Request, tr: float | None, td: float | None
 ) -> PartTable:
-    """Determine which parts may be switched, and compare sets of them in a window that ends at td."""
+    """Determine which parts may be switched, and compare sets of parts in a window that ends at td."""
     times = check_times(tr, td)
     model = read_cost_model(request)
     deck_names = [request.deck] if request.deck else []
@@ -153,7 +153,7 @@ def compare_parts(
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:
-    """Return the window in which sets are compared, or only its end; raise ArgumentError if neither is given."""
+    """Return the window in which sets are compared, or only its end; raise ArgumentError for tr without td."""
     if tr is not None and td is None:
         raise ArgumentError("`tr` needs `td`, the end of the window")
     if tr is not None and td is not None and not tr < td:
@@ -194,7 +194,7 @@ class Calibration(Answer, calibration.FittedWeights):
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
-    """Fit the cost of elements to the CPU times of runs of a site, as ``d2rpick calibrate`` does.
+    """Fit the cost of elements to the CPU times of the runs of a site, as ``d2rpick calibrate`` does.
 
     Parameters
     ----------

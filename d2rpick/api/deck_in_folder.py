@@ -1,4 +1,4 @@
-"""Find the main deck in the folder of a run, which shows the parts that become one rigid body."""
+"""Find the main deck in the folder of a run, which defines the parts that become one rigid body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FOUND: Final = "deck-in-folder"
 
 
 def find_deck_in_folder(request: Request) -> Request:
-    """Use the main deck in the folder of the run, unless a deck is named or excluded.
+    """Use the main deck in the folder of the run, unless the user names or excludes a deck.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches itself in its first computation."""
+"""Drive a Radioss run that switches parts already in its first computation."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the saved share of the CPU time of the run; None if it is unknown.
+    """Return the fraction of the CPU time of the run that is saved [-]; None if it is unknown.
 
     A run without switching is assumed to cost the mean of the deformable segments throughout.
     """

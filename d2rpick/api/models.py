@@ -46,16 +46,16 @@ PARAMETERS = (
 )
 # Default td, which is 10 ms before the ground contact of the published study [s].
 TD = 0.37
-# Tilt of a falling box, with which it lands on an edge and tumbles [degrees].
+# Tilt of a falling box, at which it lands on an edge and tumbles [degrees].
 TILT = 30.0
 # End time of the simulation [s]; the key is True for a dropped box.
 T_END = {False: 0.42, True: 1.2}
-# Largest energy imbalance of a run, relative to its largest total energy [-].
+# Largest energy imbalance of a run without a caution, relative to its largest total energy [-].
 BALANCED = 0.01
 
 
 def _copy_option(name: str, **changes: Any) -> Any:
-    """Return an option of a request with some changes for this table."""
+    """Return a copy of a request option, with the given attributes changed for this table."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
@@ -136,7 +136,7 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        # On the command line the oscillator is always complete, because click requires its options.
+        # On the command line, the oscillator is always complete, because click requires its options.
         assert oscillator is not None
         return oscillator
 
@@ -284,7 +284,7 @@ class Box:
 def _check_windows(
     starts: Sequence[float], ends: Sequence[float], t_end: float
 ) -> None:
-    """Raise ArgumentError unless the times are pairs in order, within the run."""
+    """Raise ArgumentError unless the times are ordered pairs within the run."""
     if len(starts) != len(ends):
         raise ArgumentError("give one --td for each --tr")
     previous_end = None
@@ -326,7 +326,7 @@ class Scanning:
             self.times = times
 
     def run(self, told: Callable[[int], None]) -> Scan:
-        """Compute the runs of the scan; ``told`` is called with the number of finished runs."""
+        """Compute the runs of the scan; call ``told`` with the number of finished runs."""
         from d2rpick.models.box_run import scan
         from d2rpick.report.rollover import Scan
 

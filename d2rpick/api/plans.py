@@ -149,7 +149,7 @@ def explore_for_question(
     td_window: tuple[float, float] | None,
     steps: int,
 ) -> Exploration:
-    """Find the error and saving for each td in a window, or in the longest flight."""
+    """Find the error and saving for each td in a range, or in the longest flight."""
     check_window("td_window", td_window)
     result = trade_off.explore_run(
         question.reference, question.settings, td_window, td=td, steps=steps
@@ -189,7 +189,7 @@ class Plan(RunAnswer, planning.RunPlan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card for the next run, and judge the windows with the times as printed.
+        """Print the card for the next run, and judge its windows with the times as printed.
 
         The card contains all new windows if ``every`` is True, else only the windows that the history supports.
         """
@@ -199,7 +199,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card for the next run, and judge its new windows; return None if there is no new window."""
+        """Print the card for the next run, and judge its new windows; None if there is no new window."""
         new = self.all_windows if every else self.windows
         question = self.question
         question = question._replace(
@@ -226,6 +226,7 @@ class Plan(RunAnswer, planning.RunPlan):
             command,
             card.card.text if card else None,
             explorer,
+            self.question.repeated,
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
@@ -303,7 +304,7 @@ def plan_for_question(
     done: Sequence[Times],
     before: Run | None,
 ) -> Plan:
-    """Plan the rigid windows of a run, or those after the windows that are ``done``."""
+    """Plan the rigid windows of a run, or those after the windows ``done`` in a finished run."""
     if before is not None and not done:
         raise ArgumentError(
             "`before` compares the landings of a switched run; name its windows with `done`"
@@ -338,7 +339,7 @@ def plan_for_question(
 def write_planned_deck(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
-    """Write a copy of a plan's deck with the card of the plan, and check the copy by the history.
+    """Write a copy of the deck of a plan with the card of the plan, and check the copy against the history.
 
     Returns the names of the files, the main one first, and the findings in it.
     """

@@ -29,10 +29,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
+    from d2rpick.report.formats import RepeatedQuestion
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
-    # Smallest mean energy relative to the reference run; well-switched computed runs had at least 0.77.
+    # Smallest ratio of mean energy to the reference run; well-switched computed runs had at least 0.77.
     0.7
 )
 # Options for reading a history; a deck that is checked defines its parts itself.
@@ -55,7 +56,7 @@ ADVANCED: Final = (
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights that do not come from a file.
-# A command line that contains this placeholder is refused, because it cannot repeat the weights.
+# A command line with this placeholder for weights is refused, because it cannot repeat the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -107,8 +108,8 @@ class ReadingOptions:
     )  # fmt: skip
 
 
-# The class is never changed, but it is not frozen, like other tables of options.
-# A frozen class would cost each command 2 % of its start-up time.
+# Objects of this class never change, but it is not frozen, like the other tables of options.
+# A frozen class of options would increase the start-up time of each command by 2 %.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
     """A question about a run with times in the unit of the history; contradictions raise ArgumentError.
@@ -135,7 +136,7 @@ class Request(ChoiceOptions, ReadingOptions):
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run whose files `history` names.
-    # The value is True if `deck` was found in the folder of the run.
+    # True if `deck` was found in the folder of the run.
     deck_in_folder: bool = False
     given: Collection[str] | None = None
 
@@ -229,7 +230,7 @@ class Request(ChoiceOptions, ReadingOptions):
             from d2rpick.vibration.oscillator import to_mode
 
             mode = to_mode(oscillator, self.v0)
-        # Options that have no value keep the defaults of the settings.
+        # Options without a value keep the defaults of the settings.
         chosen = {
             name: getattr(self, name)
             for name in _USES
@@ -262,14 +263,28 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` judge by the same history."""
+        """Return the options with which ``card`` and ``check`` judge windows by the same history."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
+    def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
+        """Return the words of the command line with which other commands ask about the same run."""
+        from d2rpick.report.formats import RepeatedQuestion
+
+        left_out = {"part", *without}
+        names = [name for name in self._given() if name not in left_out]
+        of_deck = {"deck", "no_deck"} - left_out
+        return RepeatedQuestion(
+            parts=self.asking(("part",)),
+            options=self.asking(names),
+            judging=(*self.judging(), *self.asking(of_deck)),
+            files=self.history,
+        )
+
     def without_history(self) -> None:
-        """Refuse options for judging if there is no history by which to judge."""
+        """Refuse options for judging if there is no history."""
         if lost := [
             name
             for name in self._given()
@@ -313,11 +328,15 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
-        if quantity not in QUANTITIES or not name:
+        if quantity not in QUANTITIES and name:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            quantities = near or f", with one of {', '.join(QUANTITIES)}"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected{quantities}"
+                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{near}, one of {', '.join(QUANTITIES)} "
+                "was expected"
+            )
+        if not name:
+            raise ArgumentError(
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")
@@ -325,7 +344,7 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
 
 
 def check_window(name: str, window: tuple[float, float] | None) -> None:
-    """Refuse an empty window of time."""
+    """Refuse an empty time window."""
     if window and not window[0] < window[1]:
         raise ArgumentError(
             f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first"
@@ -335,7 +354,7 @@ def check_window(name: str, window: tuple[float, float] | None) -> None:
 def choose_time_or_window(
     td: float | None, window: tuple[float, float] | None
 ) -> float | tuple[float, float] | None:
-    """Return the given td or the window for td; raise ArgumentError if both are given."""
+    """Return the given td or the range for td; raise ArgumentError if both are given."""
     if td is not None and window is not None:
         raise ArgumentError(
             "`td` and `td_window` exclude each other: give `td` to keep that time, `td_window` to have it chosen"

@@ -1,4 +1,4 @@
-"""Prepare decks that switch in their first run, and report the events of a run in progress."""
+"""Prepare decks that switch parts in their first run, and report the events of a run in progress."""
 
 from __future__ import annotations
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
-from d2rpick.api.tables import is_table
 from d2rpick.base.errors import give_if_written
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ class Run:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with their own histories; each has an ``id`` and a ``title``."""
+        """Parts with histories of their own; each has an ``id`` and a ``title``."""
         return self.files.parts
 
     @property
@@ -109,7 +108,7 @@ class Run:
 
     @property
     def _deck_in_folder(self) -> str | None:
-        """The only main deck in the folder that was read."""
+        """The main deck in the folder that was read, if it contains only one; otherwise None."""
         if self.folder is None:
             return None
         from d2rpick.deck import find_decks_of_run
@@ -213,6 +212,9 @@ def read(
     >>> read("sample_data/energy.csv").channels
     ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.api.tables import is_table
+
     if is_table(source):
         raise TypeError(
             f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)"
@@ -295,7 +297,7 @@ def from_frame(
 
 
 def _set_time_column(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Make the index a column if it is the time; raise ValueError if nothing is named as the time."""
+    """Turn the index into a column if it is the time; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
@@ -428,7 +430,7 @@ def extract_columns(
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the whole model's energy balance that are written at the times of the energy.
+    """Return the columns of the energy balance of the whole model at the times of the energy, keyed by name.
 
     The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """

@@ -179,7 +179,7 @@ def answer_study(
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
     if isinstance(td, tuple):
         times = ("--td-window", *map(repr, td))
-    # A study reports no CPU time, so its command omits these options.
+    # A study reports no CPU time, so these options are omitted from its command.
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(
         core.compare_rows(td, rows),
@@ -240,7 +240,7 @@ def compute_rows(
 
 
 def compute_fingerprint(question: Question) -> str:
-    """Return a digest of everything that affects a row besides its files: the options and the version."""
+    """Return a digest of everything besides its files that affects a row: the options and the version."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -288,7 +288,7 @@ class Ledger:
                 f"{name}: cannot be written (not a regular file); give another file"
             )
         try:
-            # Opening the file fails before the work begins if the file is not writable.
+            # The file is opened before the work begins, so that an unwritable file is reported at once.
             with Path(name).open("a+b") as file:
                 file.seek(0)
                 content = file.read()
@@ -348,7 +348,7 @@ class Ledger:
         return len(self.known)
 
     def told(self, runs: int) -> str:
-        """Say how many of ``runs`` runs are taken from the file, and why other stored rows are not used."""
+        """Describe how many of ``runs`` runs are taken from the file, and why other stored rows are not used."""
         if self.outdated:
             outdated = f"; {self.outdated} have changed, or were computed with other options, and are computed again"
         else:

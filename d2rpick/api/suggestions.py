@@ -71,11 +71,11 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; return None if there is no recommendation."""
+        """Print the card of the recommended pair, judged as printed; None if there is no recommendation."""
         return self.printed(Cards.for_run(self.question.run, options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; return None if there is no recommendation."""
+        """Print the card of the recommended pair, judged as printed; None if there is no recommendation."""
         pair = self.recommended
         question = self.question
         judge = partial(
@@ -126,7 +126,7 @@ class Verdict(RunAnswer, answers.PairVerdict):
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the measures of the pair as a table of one row with the columns of the CSV; unknown values are NaN.
+        """Return the measures of the pair as a one-row table with the same columns as the CSV; unknown values are NaN.
 
         Examples
         --------
@@ -151,7 +151,7 @@ class Verdict(RunAnswer, answers.PairVerdict):
         judging: Sequence[str] = (),
         cards: Cards | None = None,
     ) -> str:
-        """Return the page, with the card of the pair if it is good."""
+        """Return the page, with the card of the pair if the pair is good."""
         from d2rpick.choice.td.trade_off import explore_around
         from d2rpick.report.pages import verdict_page
 
@@ -231,7 +231,7 @@ def suggest(
 def suggest_for_question(
     question: RunQuestion, td: float | tuple[float, float] | None
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
+    """Choose tr for ``td``, or both times with td in a range or, for None, in the longest flight."""
     result = answers.suggest_in_run(question.reference, td, question.settings)
     if (
         result.better_pair
@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run, which defines the times that are not given."""
+    """Judge a pair, also by a finished switched run if there is one, which defines the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection
@@ -348,7 +348,9 @@ def judge_pair(
     result = answers.verify_run(question.reference, tr, td, question.settings)
     times = ["--tr", repr(tr), "--td", repr(td)]
     if switched is not None and switched_reference:
-        result = answers.compare_with(
+        from d2rpick.choice.switched.compared_verdict import add_comparison
+
+        result = add_comparison(
             result, question.reference, switched_reference, min_mean_energy
         )
         times += [text for name in switched.sources for text in ("--switched", name)]

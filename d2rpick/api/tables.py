@@ -1,4 +1,4 @@
-"""Convert tables of other libraries to frames of pandas; these libraries are not imported."""
+"""Convert tables of other libraries to pandas frames; these libraries are not imported."""
 
 from __future__ import annotations
 

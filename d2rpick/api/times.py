@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TimeUnit(NamedTuple):
-    """The unit of the times of a run, empty if it is unknown, and the file that should name it."""
+    """The time unit of a run, empty if it is unknown, and the file that should name the unit."""
 
     name: str
     source: str
@@ -63,11 +63,11 @@ class TimeArguments:
         return arguments.check_optional_number(name, self.convert(name, value), limits)
 
     def check_window(self, name: str, value: object) -> tuple[float, float] | None:
-        """Return a window of time, the lower time first; None if no window is given."""
+        """Return a time window with the lower time first; None if no window is given."""
         return arguments.check_time_window(name, self.convert(name, value))
 
     def check_windows(self, name: str, value: object) -> list[tuple[float, float]]:
-        """Return windows of time; None gives no windows."""
+        """Return the given time windows as a list; None gives an empty list."""
         if isinstance(value, Iterator):
             value = list(value)
         return arguments.check_windows(name, self.convert(name, value))
@@ -75,7 +75,7 @@ class TimeArguments:
     def convert_options(
         self, values: Mapping[str, Any], options: Mapping[str, Option]
     ) -> dict[str, Any]:
-        """Return the values of options by name; values that are times are converted."""
+        """Return the values of options, keyed by name; values that are times are converted."""
         return {
             name: self.convert(name, value)
             if name in options and options[name].is_time
@@ -103,7 +103,7 @@ class TimeArguments:
 
 
 def is_time_with_unit(text: str) -> bool:
-    """Return True for a string with a number followed by a unit of time.
+    """Return True for a string that consists of a number and a unit of time.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def find_unit_of_deck(deck: str | None) -> TimeUnit:
 
 
 def find_unit_of_run(run: Run | None) -> TimeUnit:
-    """Return the time unit that the files of an opened run name; empty if they name no unit, or different units."""
+    """Return the time unit that the files of an opened run name; empty if they name none, or different units."""
     if run is None:
         return _WITHOUT_RUN
     arguments.check_run("run", run)
@@ -140,7 +140,7 @@ def find_unit_of_run(run: Run | None) -> TimeUnit:
 def find_common_unit(
     runs: Sequence[Sequence[str]], selection: Selection, input_format: str
 ) -> TimeUnit:
-    """Return the time unit that all runs name, each given by its files; empty if they name no unit, or different units.
+    """Return the time unit that the files of all runs name; empty if they name none, or different units.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the only unit; empty if there is no unit, or if there are several."""
+    """Return the only unit; empty if there are none or several."""
     return next(iter(units)) if len(units) == 1 else ""
 
 

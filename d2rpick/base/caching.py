@@ -1,4 +1,4 @@
-"""Provide Python 3.12's ``cached_property`` for Python 3.11, whose own version takes a lock in each call."""
+"""Provide the ``cached_property`` of Python 3.12 for Python 3.11, whose own version takes a lock in each call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Define errors and cautions of one line each: the place, the value found, the value expected, and the cure."""
+"""Define one-line errors and cautions, each with the place, the value found, the value expected, and the cure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ INTERNAL_ERROR: Final = "internal-error"
 
 
 class D2RPickError(Exception):
-    """Root of all errors of d2rpick; its text is one line, ready to be shown to a user."""
+    """Base class of all errors of d2rpick; its text is one line, ready to be shown to a user."""
 
 
 class FormatError(D2RPickError):
@@ -29,7 +29,7 @@ class FormatError(D2RPickError):
 
 
 class ChangedError(D2RPickError):
-    """A file was rewritten while it was read, so its content mixes two states and cannot be used."""
+    """A file was rewritten while it was read, so its content mixes two versions and cannot be used."""
 
 
 class HistoryError(D2RPickError):
@@ -45,7 +45,7 @@ class DeckError(D2RPickError):
 
 
 class ArgumentError(TypeError, ValueError):
-    """The arguments contradict each other; the message names them in backticks."""
+    """The arguments contradict each other; the message names the arguments in backticks."""
 
 
 class ConfigurationError(D2RPickError):
@@ -64,7 +64,7 @@ FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return the result of ``read``; return None if the files lack these data in some state."""
+    """Return the result of ``read``; None if the files lack the data in some state."""
     try:
         return read()
     except FormatError:
@@ -159,7 +159,7 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
 
 
 def choose_verb(things: Collection[object]) -> str:
-    """Return "is" for one thing, otherwise "are"."""
+    """Return "is" for a single thing, otherwise "are"."""
     return "is" if len(things) == 1 else "are"
 
 

@@ -41,7 +41,7 @@ _TRIES: Final = 5  # number of attempts to read a file that keeps changing
 _TICK: Final = 50_000_000  # Resolution of most file times [ns].
 # Resolution of file times on file systems that store seconds without fractions [ns].
 _COARSE: Final = 2_000_000_000
-# Longest time to write a byte [ns]. A system may set the file time when the last write begins.
+# Longest time for writing a byte [ns]. A system may set the file time when the last write begins.
 _SLOWEST: Final = 5
 # Pause before a file is read again because a write may be in progress [s].
 _PAUSE: Final = 0.05
@@ -73,7 +73,7 @@ def bound(name: str) -> float:
 
 
 def describe_excess(name: str, value: float = float("inf")) -> str:
-    """Return a message if a value exceeds its limit, with the cure; otherwise an empty string.
+    """Return a message with the cure if a value exceeds its limit, otherwise an empty string.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def describe_excess(name: str, value: float = float("inf")) -> str:
 
 
 def describe_unpacked_excess(packed: int, unpacked: int) -> str:
-    """Return a message if ``packed`` bytes unpack to more bytes than the limits allow; otherwise empty."""
+    """Return a message if ``packed`` bytes unpack to more bytes than the limits allow, otherwise an empty string."""
     ratio = unpacked / max(packed, 1) if unpacked > _ALLOWED else 0.0
     return describe_excess("UNPACKED", unpacked) or describe_excess("RATIO", ratio)
 
@@ -130,7 +130,7 @@ class FileState(NamedTuple):
 
     @classmethod
     def of_stat(cls, status: os.stat_result, *, may_grow: bool = False) -> FileState:
-        """Return the present state of a file from its status.
+        """Return the present state of a file, given its status from the operating system.
 
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
@@ -152,11 +152,11 @@ class FileState(NamedTuple):
         )
 
     def is_as(self, earlier: FileState) -> bool:
-        """Return True if this is the same file and no change of it is visible."""
+        """Return True if this is the same file without any visible change."""
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Return True if this is the same file, which may have grown. A new file can reuse an old inode."""
+        """Return True if this is the same file, which may have grown. A new file can reuse the inode of an old one."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
@@ -168,7 +168,7 @@ def compute_slowness(changed: int, size: int) -> int:
 
 
 def wait_for_settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
-    """Return the state of a file after all pending writes; return None if the file keeps changing.
+    """Return the state of a file after all pending writes; None if the file keeps changing.
 
     If the file ``may_grow``, the bytes up to the size of this state do not change: further bytes are appended.
     """
@@ -221,10 +221,10 @@ def _state_of(name: str) -> FileState:
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
-    """Fill ``room`` with the bytes of a file after an offset; return their number, fewer if the file ends."""
+    """Fill ``room`` with the bytes of a file after an offset; return their number, which is less if the file ends."""
     done = 0
     while done < len(room):
-        # One call may return fewer bytes than requested, and never more than 2 GB.
+        # One call may return fewer bytes than requested, and never returns more than 2 GB.
         count = _read_once(file, room[done:], begin + done)
         if not count:
             break
@@ -233,7 +233,7 @@ def read_into(file: FileIO, room: memoryview, begin: int) -> int:
 
 
 def _read_once(file: FileIO, room: memoryview, begin: int) -> int:
-    """Read bytes from an offset into ``room`` and return their number; one system call is used if possible."""
+    """Read bytes from an offset into ``room``, and return their number; use a single system call if possible."""
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [room], begin)
     file.seek(begin)
@@ -311,7 +311,7 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
 
 
 def append_as_a_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
-    """Append to a file completely; after an OSError the file is unchanged. ``durable`` waits for the disk."""
+    """Append to a file completely; after an OSError, the file is unchanged. ``durable`` waits for the disk."""
     size = None
     try:
         with path.open("ab") as file:

@@ -1,4 +1,4 @@
-"""Remember results for a record: each result is computed once, and every td that needs it uses the same result."""
+"""Cache results computed from a record, so that every td that needs a result uses the same one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 class Memory:
-    """Results of remembered functions for one record, by function and arguments.
+    """Results of cached functions for one record, keyed by function and arguments.
 
     The memory lives as long as the record, which is read anew for each question.  A copy in another process starts
     empty.

@@ -13,7 +13,7 @@ from typing import Any, Final
 from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
-# Upper limit of a range of whole numbers that has no upper limit.
+# Upper limit of a range of whole numbers without an upper limit of its own.
 UNLIMITED: Final = 2**63
 # Ranges of numbers, each named after the numbers that it contains.
 TIME: Final = Number()
@@ -40,7 +40,7 @@ class Option(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the value of the option is a time of the run, or a window of time."""
+        """True if the value of the option is a time of the run, or a time window."""
         return self.metavar in ("T", "LO HI")
 
 
@@ -64,7 +64,7 @@ def make_option(
 
 @cache
 def list_options(table: Any) -> dict[str, Option]:
-    """Return the options of a table by the names of their fields."""
+    """Return the options of a table, keyed by field name."""
     return {
         field.name: field.metadata["option"]
         for field in fields(table)

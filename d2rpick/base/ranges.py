@@ -8,14 +8,14 @@ from d2rpick.base.tuples import NamedTuple
 
 
 class Number(NamedTuple):
-    """A finite number from ``low`` (or above it, if ``above``) to ``high``."""
+    """A finite number from ``low`` (or above ``low``, if ``above``) to ``high``."""
 
     low: float = -inf
     high: float = inf
     above: bool = False
 
     def missed(self, value: float) -> str:
-        """Return as text the limit that a value violates; empty if the value is allowed."""
+        """Return the limit that a value violates as text; empty if the value is allowed."""
         if value < self.low or (self.above and value == self.low):
             return f"{'above' if self.above else 'of at least'} {self.low:g}"
         return f"of at most {self.high:g}" if value > self.high else ""

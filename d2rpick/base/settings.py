@@ -3,11 +3,12 @@
 The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
 """
 # ruff: noqa: PTH100, PTH110, PTH111, PTH113, PTH116, PTH118, PTH120, PTH121, PTH123
-# Every command looks for settings, and importing pathlib takes longer than the search.
+# Every command looks for settings, and importing pathlib takes longer than this search.
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
@@ -70,7 +71,7 @@ def find_nearest_settings(folder: str) -> NearestSettings:
 
 
 def _list_searched_folders(folder: str) -> Iterator[str]:
-    """Yield a folder and those above it, up to the root of its repository or the user's home.
+    """Yield a folder and the folders above it, up to the root of its repository or to the user's home.
 
     Outside both, the search ends below the first folder that another user owns, and below the root of the system.
     """
@@ -102,7 +103,7 @@ def _is_owned_by_user(path: str) -> bool:
 
 
 def format_toml_value(value: object) -> str:
-    """Format a value from a TOML file for a message, cut if it is long.
+    """Format a value from a TOML file for a message; a long value is cut.
 
     Examples
     --------
@@ -165,7 +166,7 @@ def refuse_unknown_settings(
 
 
 def _has_settings(path: str) -> bool:
-    """Return True if an unused pyproject.toml has settings for d2rpick; False if it cannot be read."""
+    """Return True if an unused pyproject.toml has settings for d2rpick; False if it has none or cannot be read."""
     try:
         return _read_table(path, shared=True) is not None
     except ConfigurationError:
@@ -178,8 +179,24 @@ def _may_have_settings(text: str) -> bool:
     return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
 
 
+def _explain_toml_error(path: str, error: Exception) -> str:
+    """Return the message for a file that cannot be read as TOML, with the line and the cure if they are known."""
+    place = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
+    if place is None:
+        return f"{path}: {error}; valid TOML was expected"
+    with open(path, encoding="utf-8-sig") as file:
+        line = file.read().split("\n")[int(place[1]) - 1].strip()
+    cure = ""
+    if re.search(r"=\s*\d+,\d+\s*(#|$)", line):
+        cure = "; write the number with a decimal point"
+    reason = f"{format_toml_value(line)} was found, valid TOML was expected"
+    return (
+        f"{path}:{place[1]}:{place[2]}: {reason} ({str(error)[: place.start()]}){cure}"
+    )
+
+
 def _read_table(path: str, *, shared: bool) -> object:
-    """Read the settings of a TOML file; None if a file that is ``shared`` with other tools has no settings."""
+    """Read the settings in a TOML file; None if a file that is ``shared`` with other tools has no settings."""
     try:
         # utf-8-sig: editors on Windows begin a text with a byte order mark
         with open(path, encoding="utf-8-sig") as file:
@@ -192,7 +209,7 @@ def _read_table(path: str, *, shared: bool) -> object:
         # Python refuses to print numbers with thousands of digits, which a message may contain
         repr(table)
     except (ValueError, OSError, RecursionError) as error:
-        raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
+        raise ConfigurationError(_explain_toml_error(path, error)) from None
     if not shared:
         return table
     tools = table.get("tool")

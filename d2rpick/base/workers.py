@@ -34,7 +34,7 @@ Result = TypeVar("Result")
 
 # A fork copies the locks of all threads. Forking from one clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of calls queued for each process: enough to keep it busy, few enough to need little memory.
+# Number of calls queued for each process; it keeps the processes busy and needs little memory.
 _WAITING = 2
 # Smallest number of calls given to a cluster at a time, because its number of workers may change.
 _LEAST_ON_CLUSTER = 64
@@ -56,7 +56,7 @@ def count_cores() -> int:
 
 
 class Finished(NamedTuple):
-    """The result of the call for one item, or the error that ended it."""
+    """The result of the call for one item, or the error that ended the call."""
 
     number: int
     result: Any
@@ -64,7 +64,7 @@ class Finished(NamedTuple):
 
 
 class Farm:
-    """Computes calls in the calling process, one after the other; derived classes compute them elsewhere."""
+    """Computes calls in the calling process, one after another; derived classes compute them elsewhere."""
 
     def __enter__(self) -> Self:
         return self
@@ -106,7 +106,7 @@ class Cores(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; up to ``room`` of them are computed or wait at the same time.
+        """Yield the results of all calls; at most ``room`` calls are computed or wait at the same time.
 
         If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
         and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
@@ -129,7 +129,7 @@ class Cores(Farm):
                 yield self._answer_alone(number, function, item)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Submit a call to the pool; if the pool is broken, start a new one."""
+        """Submit a call to the pool; if the pool is broken, start a new pool."""
         try:
             return self._pool.submit(function, item)
         except _NOT_STARTED:
@@ -183,7 +183,7 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """End this process when the other end of ``held`` is closed; an interrupt ends it without a message."""
-    # A spawned process still has this handler; in a forked process `interruptible` has already changed it.
+    # A spawned process still has this handler; in a forked process, `interruptible` has already changed it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.health import (
     OF_THE_MODEL,
@@ -57,10 +58,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.switched.comparison import Comparison
+    from d2rpick.choice.td.suggest_td import Chosen
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# The search for a better pair ends after this number of pairs at other energy peaks was found inadmissible.
+# Number of pairs at other energy peaks that may be found inadmissible before the search for a better pair ends.
 _MOST_REFUSED = 3
 
 
@@ -85,7 +87,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def verified(self) -> bool:
-        """True if the pair is admissible, its grade is not poor, and its residual is at most 0.5."""
+        """True if the pair is admissible, its grade is not "poor", and its residual is at most 0.5."""
         residual = self.candidate.residual
         is_kept = residual is None or residual <= POOR_RESIDUAL
         return is_kept and self.decision.grade != POOR
@@ -94,10 +96,14 @@ class PairVerdict(AnswerAtTd):
     def decision(self) -> Decision:
         """Verdict on the pair, with its reason and cure."""
         decision = self._decide(None)
-        return self._decide(self.better) if decision.grade == POOR else decision
+        if decision.grade == POOR:
+            decision = self._decide(self.better)
+        if self._is_refuted:
+            return decision
+        return compare_in_flight(decision, self.situation, self.candidate)
 
     def _decide(self, better: Pair | None) -> Decision:
-        """Decide on the pair; ``better`` is a better pair, if one is known."""
+        """Decide on the pair; ``better`` is a better pair, or None if no better pair is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         decision = decide(
@@ -111,16 +117,17 @@ class PairVerdict(AnswerAtTd):
         )
         if self.switched is None:
             return decision
-        return decision._replace(quality=omit_comparison(decision.quality))
+        quality = omit_comparison(decision.quality)
+        return decision._replace(quality=quality, is_compared=True)
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair that is not poor, for this td or at the nearest better td; None if there is none."""
+        """A better pair whose grade is not "poor", for this td or at the nearest better td; None if there is none."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
     def _good_pair(self) -> Pair | None:
-        """The pair that the reference run recommends, whatever a finished switched run shows."""
+        """The pair recommended from the reference run alone, without regard to a finished switched run."""
         return find_good_pair(self.situation)
 
     @property
@@ -146,7 +153,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td, relative to the reference run; None if they are unknown."""
+        """Bounds of the mean energy after td relative to the reference run [-]; None if they are unknown."""
         return bound_mean_energy(self.situation, self.candidate)
 
 
@@ -157,7 +164,7 @@ def verify_in_history(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair; the situation ``earlier`` is reused if it belongs to the same td.
+    """Judge one pair (tr, td); the situation ``earlier`` is reused if it belongs to the same td.
 
     Raises
     ------
@@ -214,7 +221,7 @@ def _check_order(tr: float, td: float) -> None:
 
 
 class AcceptableWindow(NamedTuple):
-    """Window from ``start`` to ``end`` of acceptable tr [time]; ``share`` is its share of the flight up to td [-]."""
+    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` is its fraction of the flight up to td."""
 
     start: float
     end: float
@@ -260,7 +267,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """Estimate of the motion after td on basis "energy"; None on other bases."""
+        """Estimate of the motion after td if the basis is "energy"; None if the basis is another."""
         if self.situation.basis != "energy":
             return None
         return estimate_time_after(
@@ -284,7 +291,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable tr on basis "energy", in which all tr are equally good; None on other bases."""
+        """Windows of acceptable, equally good tr if the basis is "energy"; None if the basis is another."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -308,7 +315,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The clearly better pair, if its residual shows that it is not poor; otherwise None."""
+        """The better pair, if it is clearly better than the recommended pair and its residual is good; else None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
@@ -316,7 +323,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
-        """Decision on the better pair by the rules of ``verify``, without another better pair; None without a pair."""
+        """Verdict on the better pair by the rules of ``verify``; None if there is no better pair."""
         better = self.better_pair
         if better is None:
             return None
@@ -348,14 +355,10 @@ class PairSuggestion(AnswerAtTd):
         """
         better = self.better_pair
         recommended = self.recommended
-        if better is None or recommended is None:
+        if better is None or recommended is None or self.chosen is None:
             return better
         if better.residual is not None and recommended.residual is not None:
-            bound = self.chosen.residual_high if self.chosen else None
-            uncertain = 0.0 if bound is None else bound - recommended.residual
-            if recommended.residual - better.residual > max(EQUALLY_GOOD, uncertain):
-                return better
-            return None
+            return better if _has_smaller_residual(better, self.chosen) else None
         levels = [
             max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5
             for td in (better.td, recommended.td)
@@ -363,12 +366,88 @@ class PairSuggestion(AnswerAtTd):
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
+def _has_smaller_residual(pair: Pair, candidate: Candidate) -> bool:
+    """Return True if the residual of a pair is smaller than that of a candidate, beyond its uncertainty."""
+    if pair.residual is None or candidate.residual is None:
+        return False
+    bound = candidate.residual_high
+    uncertain = 0.0 if bound is None else bound - candidate.residual
+    return candidate.residual - pair.residual > max(EQUALLY_GOOD, uncertain)
+
+
 def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
-    """Return the verdict on the recommended pair, with a better pair from a search if the pair is not good."""
+    """Return the verdict on the recommended pair; if that pair is not good, search for a better pair first."""
     decision = answer.decision
-    if decision is None or decision.reaches(GOOD) or answer.better_pair:
+    best = answer.chosen
+    if best is None or decision is None or decision.reaches(GOOD):
         return decision
-    return suggest_at(answer.situation, ranked=answer.candidates).decision
+    if not answer.better_pair:
+        decision = suggest_at(answer.situation, ranked=answer.candidates).decision
+    return decision and compare_in_flight(decision, answer.situation, best)
+
+
+def compare_in_flight(
+    decision: Decision, situation: Situation, candidate: Candidate
+) -> Decision:
+    """Add to the decision on a pair a clearly better pair of the same flight, or else the range of td without one.
+
+    The flight is searched only if another time may be better, and no better pair is known yet.
+    """
+    needs_other_times = decision.objections or any(
+        cause.needs_other_times for cause in decision.quality.causes
+    )
+    if decision.grade == GOOD or decision.better or not needs_other_times:
+        return decision
+    choice = _choose_in_flight(situation)
+    if choice is None or choice.recommended is None or choice.decision is None:
+        return decision
+    if decision.grade == POOR:
+        is_better = choice.decision.grade != POOR
+    else:
+        is_better = _has_smaller_residual(choice.recommended, candidate)
+    if is_better:
+        return decision._replace(better=choice.recommended)
+    return decision._replace(best_of=choice.compared_td)
+
+
+def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
+    """Return the pair that is chosen in the flight of a situation; None if its flight is unknown."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.flights import find_longest_flight
+
+    history, settings = situation.history, situation.settings
+    flight = situation.flight
+    if flight.start is None:
+        return None
+    own = (flight.start, history.end if flight.end is None else flight.end)
+    longest = find_longest_flight(history, settings, otherwise=own)
+    is_longest = longest[0] <= situation.td <= longest[1]
+    return _choose_in_window(history, settings, longest if is_longest else own)
+
+
+@remember
+def _choose_in_window(
+    history: History, settings: Settings, window: tuple[float, float]
+) -> PairSuggestion | None:
+    """Return the pair that is chosen in a window for td; None if the record does not allow a choice."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.suggest_td import choose_td
+
+    try:
+        return _suggest_in_window(choose_td(history, window, settings))
+    except RangeError:
+        return None
+
+
+def _suggest_in_window(chosen: Chosen) -> PairSuggestion:
+    """Return the suggestion for the td that was chosen in a window."""
+    answer = suggest_at(chosen.situation)
+    return replace(
+        answer,
+        td_window=chosen.window,
+        compared_td=chosen.inside,
+        longer=chosen.given_up(answer.recommended),
+    )
 
 
 def suggest_in_history(
@@ -382,7 +461,7 @@ def suggest_in_history(
 def suggest_at(
     situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
 ) -> PairSuggestion:
-    """Rank the candidates for tr in a given situation, recommend one, and search for a better td.
+    """Rank the candidates for tr at the td of a situation, recommend one, and search for a better td.
 
     ``ranked`` lists the ranked candidates, at least up to the recommended one, if they are already known.
     """
@@ -407,14 +486,14 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair of the nearest energy peak in the flight that has one; None if no peak has one.
+    """Return the recommended pair of the nearest energy peak that has one, within the flight; None if no peak has one.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # If the end of the flight is unknown, no td after the given td is tried.
+    # If the end of the flight is unknown, times after the given td are not tried.
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -440,7 +519,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair that is not poor: the recommended tr for this td, or the pair of the nearest better td."""
+    """Return a pair whose grade is not "poor": the recommended pair at this td or at the nearest better td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -451,7 +530,7 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _is_level_refused(situation: Situation) -> bool:
-    """Return True if no tr can have the energy level at td, because that level is negative or too high.
+    """Return True if no tr can match the energy level at td, because that level is negative or too high.
 
     This test saves time, since noise makes thousands of such peaks.
     """
@@ -470,7 +549,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
-    """Examine the same record at another td in the same way as at a td that the user gives."""
+    """Examine the same record at another td, in the same way as at a td given by the user."""
     # The oscillator is fitted again, but the slow search for the reason of a refusal is omitted.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
@@ -500,6 +579,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "
             f"{flight.start:.6g} to {flight.end:.6g}; give a smaller `margin`"
         )
+    if not (situation.history.parts or situation.history.energy.any()):
+        return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
     if not ranked:
         level = situation.energy_td
         return (
@@ -507,7 +588,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             "peaks near it"
         )
     if situation.td > situation.latest_td:
-        return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
+        reasons = "; ".join(list_objections_to_td(situation)).removeprefix("td ")
+        return f"td = {situation.td:.6g} lies {reasons}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
@@ -526,7 +608,7 @@ def suggest_in_run(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> PairSuggestion:
-    """Choose tr for ``td``, or both times if ``td`` is a window (low, high) or None (the longest flight) [time].
+    """Choose tr for ``td``, or both times if ``td`` is a time range (low, high) or None (the longest flight) [time].
 
     If ``with_better`` is False, no better td than a given td is determined.  If td is chosen, no flight is assumed to
     begin before ``since``, and ``times`` are tried in addition to the energy peaks, by default an even grid [time].
@@ -544,17 +626,33 @@ def suggest_in_run(
         )
 
         chosen = choose_td(reference.history, td, settings, since, times)
-        answer = suggest_at(chosen.situation)
-        answer = replace(
-            answer,
-            td_window=chosen.window,
-            compared_td=chosen.inside,
-            longer=chosen.given_up(answer.recommended),
-        )
+        answer = _suggest_in_window(chosen)
     else:
         situation = examine_td(reference.history, td, settings)
         answer = suggest_at(situation, with_better=with_better)
+        if with_better:
+            answer = _add_choice_in_flight(answer)
+    _refuse_switched(answer.situation)
     return _add_health(answer, reference.run)
+
+
+def _refuse_switched(situation: Situation) -> None:
+    """Raise RangeError if the parts were rigid in the flight up to td."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.switched.frozen import refuse_switched
+
+    refuse_switched(situation.history, situation.flight.start, situation.td)
+
+
+def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
+    """Add to the answer for a given td what the search of its flight finds if the pair is not good."""
+    best, decision = answer.chosen, answer.decision
+    if best is None or decision is None or decision.better:
+        return answer
+    decision = compare_in_flight(decision, answer.situation, best)
+    if decision.better:
+        return replace(answer, better_pair=decision.better)
+    return replace(answer, compared_td=decision.best_of)
 
 
 def verify_run(
@@ -564,46 +662,15 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair of a reference run, with the errors and the argument ``earlier`` of `verify_in_history`."""
+    """Judge one pair (tr, td) of a reference run; ``earlier`` and the errors are those of `verify_in_history`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
+    _refuse_switched(verdict.situation)
     return _add_health(verdict, reference.run)
 
 
-def compare_with(
-    verdict: PairVerdict,
-    reference: Reference,
-    switched: Reference,
-    min_mean: float = 0.0,
-) -> PairVerdict:
-    """Add the comparison of a finished switched run with the reference run to a verdict.
-
-    Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
-    of the reference run [-].
-
-    Raises
-    ------
-    RangeError
-        If one of the two runs does not continue after td.
-    """
-    from d2rpick.choice.switched.comparison import compare_with_reference
-
-    comparison = compare_with_reference(
-        verdict.situation, verdict.candidate.tr, reference, switched, min_mean
-    )
-    return replace(
-        verdict,
-        switched=comparison,
-        computed=switched.history,
-        # If the switched run deviates too much, the pair is inadmissible, whatever the reference run shows.
-        admissible=verdict.admissible and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
-        cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
-    )
-
-
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:
-    """Add the health of the run, with its warnings, in the rigid window or else in the flight up to td.
+    """Add the health of the run and its warnings, for the rigid window or, without a pair, for the flight up to td.
 
     The time after td does not matter for the choice.
     """

@@ -1,4 +1,4 @@
-"""Judge the health of a run: whether its energies are reliable, which loads act in the window, and when to refuse it.
+"""Judge the health of a run: the reliability of its energies, the loads that act in the window, and reasons to refuse.
 
 A term that the files lack gives None, never 0.  Shares are relative to the peak of the internal energy, as is usual
 in practice, and are None if that peak is tiny.
@@ -25,42 +25,42 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
 
-# Largest hourglass energy as a share of the peak internal energy, for the model and for each part.
+# Largest hourglass energy as a fraction of the peak internal energy, for the model and for each part [-].
 # One source of the hourglass limit is the rule of thumb of DYNAmore (dynasupport.com/howtos/element/hourglass).
 # Another source of the hourglass limit is NCHRP Web-Only Document 179 (2010), table E-1.
 MOST_HOURGLASS = 0.10
 # Largest relative change of the total energy [-] (source: NCHRP Web-Only Document 179 (2010), table E-1).
 MOST_IMBALANCE = 0.10
-# MOST_SLIDING: largest contact energy without friction, as a share of the peak internal energy [-].
+# MOST_SLIDING: largest contact energy without friction, as a fraction of the peak internal energy [-].
 # The source of MOST_SLIDING is dynasupport.com/howtos/general/contact-energy.
-# MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a share of the peak internal energy [-].
+# MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a fraction of the peak internal energy [-].
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# _TINY_SHARE: internal energies below this share of the run's largest energy are treated as rounding errors [-].
+# _TINY_SHARE: largest internal energy treated as a rounding error, as a fraction of the run's largest energy [-].
 # _TINY_SHARE follows from the precision of the files: single precision and glstat have six to seven digits.
-# _FLOOR: internal energies below this are treated as 0 [energy]; LS-DYNA's start at 2e-20 per process.
+# _FLOOR: largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
 _TINY_SHARE, _FLOOR = 1e-6, 1e-15
-# Parts whose internal energy is below this share of the largest part energy are ignored [-].
+# Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01
-# The energy ratio is used only while its reference energy exceeds this share of its peak [-].
+# Smallest reference energy at which the energy ratio is used, as a fraction of the peak of the reference energy [-].
 # If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
 WRONG_ENERGY: Final = "engine-wrong-energy"
-# Codes of warnings that do not matter if the momentum of the parts shows their free flight.
+# Codes of the warnings that are omitted if the part momenta show that the parts are in free flight.
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# A run has diverged if it meets the following three criteria within the share _WITHIN of the record.
-# _GAIN: the kinetic energy exceeds all earlier energies by this factor [-].
-# _SPEED: the kinetic energy exceeds the internal energy by this factor [-].
-# _TORN: the internal energy grows by this factor as elements are torn [-].
-# Sound runs do not meet these criteria, because a load that accelerates a body also deforms it.
+# _WITHIN: fraction of the record within which a diverged run meets the following three criteria [-].
+# _GAIN: smallest ratio of the kinetic energy of a diverged run to all earlier energies [-].
+# _SPEED: smallest ratio of the kinetic energy of a diverged run to the internal energy [-].
+# _TORN: smallest growth factor of the internal energy of a diverged run, in which elements are torn [-].
+# Sound runs do not meet all three criteria of a diverged run, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# Smallest number of earlier states with energy for recognising a diverged run; the first states may be round-off.
+# Smallest number of earlier states with energy needed to recognise a diverged run; first states may be round-off.
 _FEWEST: Final = 12
-# Energies below this value are treated as zero in any unit system, because LS-DYNA's energies start at 2e-20.
+# Largest energy that is treated as zero in any unit system, because energies of LS-DYNA start at 2e-20.
 _NOTHING: Final = 1e-20
 
 
@@ -183,7 +183,7 @@ def _is_above(value: float | None, limit: float) -> bool:
 
 
 def _is_unbalanced(health: Health) -> bool:
-    """Return True if the energy ratio leaves its limits."""
+    """Return True if the energy ratio (total energy to initial energy plus external work) lies outside its limits."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     return (
@@ -193,7 +193,7 @@ def _is_unbalanced(health: Health) -> bool:
     )
 
 
-# Code of each warning about the health of a run, the condition for the warning, and its text.
+# For each warning about the health of a run: its code, the condition for issuing it, and its text.
 # The internal energy of an LS-DYNA model includes that of eroded elements (ftp.lstc.com, FAQ energy_balance).
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
@@ -236,7 +236,7 @@ def _find_peak(balance: Balance) -> float | None:
 
 
 def _compute_share(energy: Samples | None, peak: float | None) -> float | None:
-    """Return the highest value of a term relative to the peak of the internal energy [-]; 0 if it is never positive."""
+    """Return the highest value of an energy relative to the peak internal energy [-]; 0 if it is never positive."""
     if energy is None or peak is None:
         return None
     return max(0.0, float(energy.max())) / peak
@@ -250,7 +250,7 @@ def _subtract_friction(balance: Balance) -> Samples | None:
 
 
 def _find_worst_part(balance: Balance) -> dict[str, Any]:
-    """Return the largest hourglass share of a part, and the part, as fields of `Health`."""
+    """Return the largest hourglass energy fraction among the parts, and the part, as fields of `Health`."""
     smallest_peak = max(
         _FLOOR,
         _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0),
@@ -294,7 +294,7 @@ def _find_ratio_range(balance: Balance) -> dict[str, Any]:
 
 
 def _compute_total(balance: Balance) -> Samples | None:
-    """Return the total energy written by the solver, or the sum of all terms; None if a main term is unknown."""
+    """Return the total energy written by the solver, or else the sum of all energies; None if a main one is unknown."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
@@ -310,7 +310,7 @@ def _compute_total(balance: Balance) -> Samples | None:
 def _measure_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
-    """Return contact, eroded and external energy in the window as fields of `Health`, as shares of the energy there."""
+    """Return contact, eroded and external energy in the window, relative to the energy there, as fields of `Health`."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         if balance.time[inside].size:
@@ -325,7 +325,7 @@ def _measure_window(
         ("window_eroded", balance.eroded),
     ):
         if energy is not None and energy[inside].size:
-            # The quantum is the rounding error of the energy, which depends on its number of printed digits.
+            # The quantum is the rounding error of the energy, which depends on the number of printed digits.
             quantum = balance.precision.quantum(float(np.abs(energy[inside]).max()))
             fields[name] = max(0.0, float(np.ptp(energy[inside])) - quantum) / locked
     work = compute_work_beyond_gravity(balance, start, end)
@@ -341,7 +341,7 @@ def refuse_unsound(
     *,
     choosing: bool = True,
 ) -> None:
-    """Raise RangeError if the run cannot be used at all, or if a given time seems to be in another unit.
+    """Raise RangeError if the run cannot be used at all, or if a given time seems to be in the wrong unit.
 
     It is also raised if the load ends outside the record according to the settings.
 
@@ -394,7 +394,7 @@ def _describe_divergence(history: History) -> str | None:
     time = balance.time
     kinetic = np.abs(balance.kinetic)
     internal = np.abs(balance.internal)
-    # This array counts, for each state, the states that are earlier by more than the share _WITHIN of the record.
+    # This array counts, for each state, the states that are earlier by more than the fraction _WITHIN of the record.
     earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))
     counted = (
         np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
@@ -418,7 +418,7 @@ def _describe_divergence(history: History) -> str | None:
 
 
 def _has_no_energy(history: History) -> bool:
-    """Return True if the internal energies of chosen parts and model are always 0, or all energies are negligible."""
+    """Return True if the internal energies of the chosen parts and of the model are always 0, or all are negligible."""
     balance = history.balance
     if balance is None:
         return False

@@ -1,4 +1,4 @@
-"""Print cards whose times were judged with an energy history."""
+"""Print D2R cards whose times were judged with an energy history."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def complete_printing(printing: Printing, history: History) -> Printing:
-    """Fill in missing options of a card from a history.
+    """Fill in missing options of a card from a history, such as the solver and the parts.
 
     The history defines the solver, the chosen parts, the end of the run, and the times at which a contact force acts.
     """
@@ -79,7 +79,7 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
 def print_pair(
     reference: Reference, situation: Situation, tr: float, printing: Printing
 ) -> PrintedCard | None:
-    """Print the card for ``tr`` and the td of a situation, and judge its times; None if no parts are to be switched."""
+    """Print the card for ``tr`` and the td of a situation, with a verdict on both; None without parts to switch."""
     history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation
@@ -121,7 +121,7 @@ def print_judged_card(
 
 
 def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
-    """Return the windows to judge: windows of switches by force are narrowed to the output states inside."""
+    """Return the windows to judge; windows that depend on a force are narrowed to the output states within them."""
     from d2rpick.flight.contact_times import (
         narrow_to_states,
     )  # Imported here to keep start-up fast.
@@ -133,7 +133,7 @@ def _narrow_windows(windows: Sequence[Times], history: History) -> tuple[Times, 
 def _list_card_remarks(
     done: Sequence[Times], history: History, verdicts: Sequence[PairVerdict]
 ) -> Iterator[str]:
-    """Yield comments for the card: windows that were not judged, the level of the whole model, and the verdicts."""
+    """Yield comments for the card: unjudged windows, the energy level of the whole model, and the verdicts."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."

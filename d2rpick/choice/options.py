@@ -1,4 +1,4 @@
-"""Declare the options of a choice: type, default, help, range, and the commands that have each option.
+"""Declare the options of a choice, each with its type, default, help, range and commands.
 
 The options of the command line, the keyword arguments of Python and the settings of a choice all follow from the fields
 of `ChoiceOptions`.  This module imports no numerics, since each command needs the table when it starts.
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-# Names of quantities in messages that differ from their keys.
+# Names used in messages for quantities whose names differ from their keys.
 _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
-    """A limit that a recommended pair must keep. A pair whose value is unknown does not keep the limit.
+    """A limit that a recommended pair must keep. A pair with an unknown value does not keep the limit.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
     value must not be below the limit, otherwise not above it.
@@ -39,7 +39,7 @@ class Limit(NamedTuple):
     is_lower: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
-        """Return True for each of the ``values`` that keeps the limit; NaN stands for an unknown value.
+        """Return True for each of the ``values`` that keeps the limit; NaN is an unknown value, which does not keep it.
 
         Examples
         --------
@@ -49,7 +49,7 @@ class Limit(NamedTuple):
         return values >= limit if self.is_lower else values <= limit
 
     def explain(self, value: float | None, limit: float) -> str:
-        """Return the message that a value exceeds the limit, or that it is unknown.
+        """Return the message that a value exceeds the limit, or that the value is unknown.
 
         Examples
         --------
@@ -70,7 +70,7 @@ class Limit(NamedTuple):
 
 
 class Use(NamedTuple):
-    """How an option of a choice is used.
+    """Commands and answers that use an option of a choice, and the limit that it sets.
 
     ``limit`` is what its value limits, None if it is not a limit.  ``of_cards``: ``card`` and ``check --history`` have
     the option too.  ``of_sets``: ``parts`` and ``study`` have it too.  ``is_advanced``: the last section of the help
@@ -176,7 +176,7 @@ class ChoiceOptions:
 
     @property
     def limits(self) -> Iterator[tuple[Limit, float]]:
-        """The limits of a recommendation that the user has set, with their values."""
+        """Yield each limit of a recommendation that the user has set, with its value."""
         for name, use in list_uses().items():
             value = getattr(self, name)
             if use.limit is not None and value is not None:
@@ -185,5 +185,5 @@ class ChoiceOptions:
 
 @cache
 def list_uses() -> dict[str, Use]:
-    """Return how each option of a choice is used, by the names of the options."""
+    """Return how each option of a choice is used, keyed by option name."""
     return {entry.name: entry.metadata["use"] for entry in fields(ChoiceOptions)}

@@ -26,8 +26,8 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.switched.frozen import Times, find_frozen_times
 from d2rpick.choice.switched.switched_run import (
-    Times,
     find_rigid_times,
     select_model_momenta,
 )
@@ -49,27 +49,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Radioss output that contains part momenta
+# Name of the Radioss output that contains the part momenta.
 _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 class PartOverview(NamedTuple):
-    """A part and its highest internal energy; None if the energy is not written, or not in every state."""
+    """A part and its highest internal energy; None if the energy is missing in some or all states."""
 
     part: Part
     energy_max: float | None
 
 
 class ForceOverview(NamedTuple):
-    """The name of a contact or rigid wall, and the intervals (start, end) in which it ``acts`` [time]."""
+    """A contact or rigid wall, and the intervals (start, end) in which it ``acts`` on parts [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
 
 
 class Sampling(NamedTuple):
-    """Output intervals [time]."""
+    """Smallest, usual and largest output interval [time]."""
 
     min: float
     median: float
@@ -86,7 +86,8 @@ class Overview(NamedTuple):
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
     show the flights for certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run
-    that was used, and ``selection`` the columns and parts that the user chose.
+    that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are the windows in which
+    parts are rigid.
     """
 
     source: tuple[str, ...]
@@ -110,11 +111,12 @@ class Overview(NamedTuple):
     contact_forces: tuple[ForceOverview, ...] = ()
     deck: str | None = None
     selection: Selection = Selection()
+    rigid: tuple[Times, ...] = ()
 
     @property
     def verdict(self) -> str:
         """Verdict on whether switch times can be chosen from this run: "use", "use with care" or "do not use"."""
-        if self.unjudged or not self.flights:
+        if self.unjudged or not self.flights or self._is_spent:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
@@ -125,14 +127,33 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
             return "no free flight is found, so nothing can be made rigid"
+        if self._is_spent:
+            return (
+                f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
+                "choose times from the reference run, and compare this one with it (d2rpick verify)"
+            )
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
 
     @property
+    def _is_spent(self) -> bool:
+        """True if parts were rigid, and no flight begins after that."""
+        last = max((end for _, end in self.rigid), default=None)
+        return last is not None and all(
+            flight.start < last for _, flight in self.flights
+        )
+
+    @property
     def _doubts(self) -> list[str]:
-        """Reasons why a run with flights can be used only with care."""
+        """Reasons why a run with flights can only be used with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
+        if self.rigid:
+            when = _list_times(self.rigid)
+            doubts.insert(
+                0,
+                f"parts are rigid from {when}, so only later flights can be planned",
+            )
         if not self.complete:
             doubts.append(
                 "the files end within a state; read them again when the run has ended"
@@ -145,7 +166,7 @@ class Overview(NamedTuple):
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """Warnings about the health of the run and its engine, and the reasons why it cannot be judged."""
+        """Warnings about the health of the run and about the engine version, and reasons why it cannot be judged."""
         health = warn_about_health(self.health) if self.health else ()
         return (*self.alarms, *health, *warn_about_engine(self.source))
 
@@ -158,7 +179,7 @@ def _describe_flights(flights: Sequence[tuple[str, FreeFlight]]) -> str:
 
 
 def _describe_health(health: Health | None) -> str:
-    """State that all written energies are within their limits."""
+    """State that all energies written by the solver are within their limits."""
     if health is None or health.energy_ratio_min is None:
         return (
             "the health of the run is unknown, because the files contain no energy balance "
@@ -170,7 +191,7 @@ def _describe_health(health: Health | None) -> str:
 def describe_run(
     run: OpenedRun, selection: Selection, deck: str | None = None
 ) -> Overview:
-    """Describe all databases of a run; ``selection`` and ``deck`` affect the flights."""
+    """Describe all databases of a run; ``selection`` and ``deck`` determine which flights are found."""
     deck_warnings: tuple[Caution, ...] = ()
     if deck is not None:
         run, deck_warnings = _apply_deck(run, deck)
@@ -183,6 +204,7 @@ def describe_run(
     if history:
         flaws = tuple(list_flaws(history))
         rigid = find_rigid_times(Reference(run, history))
+        rigid = rigid or find_frozen_times(history)
         flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
@@ -223,11 +245,12 @@ def describe_run(
         ),
         deck=deck,
         selection=selection,
+        rigid=rigid,
     )
 
 
 def _read_times(first: Legs) -> tuple[Samples, str | None]:
-    """Return the times of the states, and a message if they have to be chosen among several columns.
+    """Return the times of the states, and a message if the user has to choose one of several time columns.
 
     Raises
     ------
@@ -251,7 +274,7 @@ def _read_times(first: Legs) -> tuple[Samples, str | None]:
 def _list_notes(
     run: OpenedRun, selection: Selection, refusal: str | None
 ) -> Iterator[str]:
-    """Yield what the readers omitted or assumed, and the reason ``refusal`` why times could not be read."""
+    """Yield what the readers omitted or assumed, and the message ``refusal`` if the times could not be read."""
     yield from run.left_out
     for database in run.databases:
         yield from _read_notes(database)
@@ -262,7 +285,7 @@ def _list_notes(
 
 
 def _measure_sampling(time: Samples) -> Sampling | None:
-    """Return the output intervals between the states; None for fewer than two states."""
+    """Return the output intervals between the states; None if there are fewer than two states."""
     steps = np.diff(time)
     if not steps.size:
         return None
@@ -272,7 +295,7 @@ def _measure_sampling(time: Samples) -> Sampling | None:
 
 
 def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ...]]:
-    """Add the supports, gravity and joints of a deck to the run; also return warnings. Raise DeckError on failure."""
+    """Add the supports, gravity and joints defined in a deck to the run, with warnings; raise DeckError on failure."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.parts.deck_of_run import (
         add_surroundings,
@@ -289,7 +312,7 @@ def _apply_deck(run: OpenedRun, deck: str) -> tuple[OpenedRun, tuple[Caution, ..
 
 
 def _name_missing_output(run: OpenedRun) -> str:
-    """Name the solver output that contains part momenta, which these files lack."""
+    """Name the solver output that would contain the part momenta missing from these files."""
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         output = _RADIOSS
@@ -307,7 +330,7 @@ def _name_missing_output(run: OpenedRun) -> str:
 
 
 def _read_notes(database: Legs) -> tuple[str, ...]:
-    """Return the notes of a database, or its error as a note."""
+    """Return the notes that a database reader issues, or its error as a note."""
     try:
         return database.notes
     except FormatError as error:
@@ -332,7 +355,7 @@ def _list_part_overviews(run: OpenedRun) -> Iterator[PartOverview]:
 
 
 def _find_highest_energy_of_part(run: OpenedRun, part: Part) -> float | None:
-    """Return the highest internal energy of a part [energy]; None if it is not written."""
+    """Return the highest internal energy of a part [energy]; None if the solver did not write it."""
     return give_if_written(lambda: _find_maximum(run.part_energies([part])))
 
 
@@ -342,11 +365,16 @@ def _find_maximum(energies: Samples) -> float | None:
 
 
 def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
-    """Yield a warning if parts are rigid in some windows."""
+    """Yield a warning if parts are rigid in some time windows of the run."""
     if rigid:
-        when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        when = _list_times(rigid)
         effect = "part data and internal energy mean nothing there and are not used for the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
+
+
+def _list_times(windows: Sequence[Times]) -> str:
+    """Return windows of time as text."""
+    return list_names([f"{start:.6g} to {end:.6g}" for start, end in windows])
 
 
 def _assess_health_of_run(
@@ -355,7 +383,7 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside of rigid windows; None if there are no energies."""
+    """Return the health of the run outside its rigid windows; None if there are no energies."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
@@ -383,7 +411,7 @@ def _assess_health_of_run(
 
 
 def _read_history(run: OpenedRun, selection: Selection) -> History | None:
-    """Return the history to be judged; None if the user has to choose an energy, or there is no state."""
+    """Return the history to be judged; None if the user has to choose an energy, or if there is no state."""
     if selection.parts:
         selection = replace_words_by_part_ids(run, selection)
     for wanted in (selection.parts, selection.flying):
@@ -405,7 +433,7 @@ def _warn_about_missing_energy(
 def _warn_about_flights_outside(
     history: History, flights: Sequence[tuple[str, FreeFlight]]
 ) -> Iterator[Caution]:
-    """Yield a warning for each flight that the energies do not reach, as in files of different runs."""
+    """Yield a warning for each flight outside the time range of the energies, as in files of different runs."""
     for _, flight in flights:
         last_td = flight.end - LEAST_MARGIN * (flight.end - flight.start)
         if flight.end_seen and last_td > history.end:
@@ -420,7 +448,7 @@ def _warn_about_flights_outside(
 def _find_flights_to_choose_from(
     history: History,
 ) -> tuple[tuple[str, FreeFlight], ...]:
-    """Return the flights from which ``plan`` and ``suggest`` choose; empty if they refuse the run."""
+    """Return the flights from which ``plan`` and ``suggest`` choose, with their sources; empty for a refused run."""
     try:
         settings = Settings()
         refuse_unsound(history, settings)

@@ -1,4 +1,4 @@
-"""Define a question, which consists of a run, its selected energy, and the settings for the choice."""
+"""Define a question: a run, its selected energy, and the settings for the choice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DEFAULT = Selection()
 
 
 class Reference(NamedTuple):
-    """A reference run, and its selected energy."""
+    """A reference run with its selected energy."""
 
     run: OpenedRun
     history: History
@@ -44,7 +44,7 @@ class Reference(NamedTuple):
         return cls(run, run.history(selection))
 
     def like(self, run: OpenedRun, selection: Selection = _DEFAULT) -> Reference:
-        """Read the same parts from another run of the same model, even if the request named them differently."""
+        """Read the same parts from another run of the same model, even if the selection named them differently."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)

@@ -72,7 +72,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click passes the argument
-        """Return the help option. The option of click would be translated by files on the user's system."""
+        """Return d2rpick's own help option, because files on the user's system could translate that of click."""
         return self._help
 
     @cached_property
@@ -100,6 +100,10 @@ class Documented(click.Command):
             for line in (self.epilog or "").split("\n")
         ]
         formatter.write("\n" + "\n".join(lines) + "\n")
+
+
+# An option is not suggested if its likeness to a mistyped one is smaller than that of the best by more than this [-].
+_LESS_ALIKE: Final = 0.1
 
 
 class _CommandGroup(Documented, click.Group):
@@ -176,7 +180,7 @@ class _CommandGroup(Documented, click.Group):
             code = super().main(args, prog_name or "d2rpick", **extra)
         except click.UsageError as error:
             where = f" (see '{error.ctx.command_path} --help')" if error.ctx else ""
-            stop_with_error(error.format_message().rstrip(".") + where)
+            stop_with_error(_format_usage_error(error).rstrip(".") + where)
         except click.ClickException as error:
             stop_with_error(error.format_message())
         except OSError as error:  # The help or the version could not be written.
@@ -185,10 +189,26 @@ class _CommandGroup(Documented, click.Group):
             _tell_error("interrupted")
             raise KeyboardInterrupt from None
         except _PipeClosed:
-            # Writing to os.devnull keeps Python from reporting an error when it closes the stream at exit.
+            # Writing to os.devnull prevents Python from reporting an error when it closes the stream at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _format_usage_error(error: click.UsageError) -> str:
+    """Return the message of a usage error; an unknown option is compared with the options that resemble it most."""
+    if not isinstance(error, click.NoSuchOption) or not error.possibilities:
+        return error.format_message()
+    import difflib
+
+    likeness = {
+        name: difflib.SequenceMatcher(None, error.option_name, name).ratio()
+        for name in error.possibilities
+    }
+    best = max(likeness.values())
+    nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
+    names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
+    return f"{error.message.rstrip('.')}. Did you mean {names}?"
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
@@ -234,7 +254,7 @@ def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]
         help_text, _, examples = cleandoc(function.__doc__).partition(
             "\n\nExamples\n--------\n"
         )
-        # Each command of the examples is on one line.
+        # Each command in the examples is on one line.
         lines = examples.replace("\\\n    ", "").split("\n")
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(

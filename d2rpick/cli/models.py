@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of the solver's tables, by the kind of table; each table also has the column time_s.
+# Columns of the solver tables, keyed by kind of table; each table also has the column time_s.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
@@ -106,7 +106,7 @@ def rollover(box: Box, output: Output) -> None:
 
 
 def _run(box: Box, output: Output) -> None:
-    """Compute one run; for a plot also the reference run."""
+    """Compute one run; a plot also needs the reference run."""
     from d2rpick.report.history_files import BOX_WRITERS, choose_history_format
 
     form = box.write_as or choose_history_format(output.output_file, HISTORIES)
@@ -128,7 +128,7 @@ def _run(box: Box, output: Output) -> None:
 
 
 def _scan(box: Box, output: Output) -> None:
-    """Compute many switched runs, one of which has the recommended tr."""
+    """Compute many switched runs, one of them with the recommended tr."""
     output = output.beside()
     scanning = Scanning(box)
     plot = output.plot

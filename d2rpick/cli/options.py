@@ -11,12 +11,20 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
-from d2rpick.api.request import ADVANCED, CHOOSING, JUDGING, READING, Request
+from d2rpick.api.option_names import replace_arguments
+from d2rpick.api.request import (
+    ADVANCED,
+    CHOOSING,
+    JUDGING,
+    READING,
+    Request,
+    write_option,
+)
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import TIME, Option, list_options, make_option_name
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
-from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
+from d2rpick.cli.output import Output, encode_text, tell
 from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
     CARDS,
@@ -66,8 +74,9 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 }
 # Options that write files; if the command is repeated, these files already exist.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
+_PAIRS: Final = ("td_window",)
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
-# Key in the context of click: True if only the settings are to be shown.
+# Key in the context of click for a flag that is True if only the settings are to be shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -80,7 +89,7 @@ class Command(Documented):
     """A command that can show its settings instead of running, and names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line. Options that neither it nor the environment sets come from the settings file."""
+        """Read the command line. Options set neither there nor in the environment come from the settings file."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         ctx.meta[_SETTINGS_ONLY] = _ASKS_FOR_SETTINGS in args
@@ -109,7 +118,7 @@ class Command(Documented):
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the help of the options in groups by their subject."""
+        """Write the help of the options in groups by subject."""
         shown_options = (
             parameter
             for parameter in self.get_params(ctx)
@@ -140,8 +149,8 @@ class Command(Documented):
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         convert_typed_times(ctx)
-        # numpy is imported before the modules of a run, because its import makes many nested calls.
-        # In Python 3.11, nested calls are slow if they repeatedly cross the end of a piece of the stack.
+        # numpy is imported here, at a small call depth, because its import makes many nested calls.
+        # In Python 3.11, nested calls are slow if they repeatedly cross the end of a chunk of the call stack.
         if ctx.params.get("history"):
             import numpy as np  # noqa: F401  only the import matters
         try:
@@ -151,14 +160,14 @@ class Command(Documented):
 
 
 def _make_optional(parameter: click.Parameter) -> click.Parameter:
-    """Return a copy of a parameter that need not be given."""
+    """Return a copy of a parameter that is not required."""
     optional = copy(parameter)
     optional.required = False
     return optional
 
 
 class Either(click.Option):
-    """An option that excludes others. If one of these is on the command line, its environment variable is ignored."""
+    """An option that excludes others. If one of them is on the command line, its environment variable is ignored."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -327,7 +336,7 @@ def make_click_option(
 def make_time_option(
     name: str, text: str, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that is a time, or a window of time."""
+    """Make an option of one command for a time, or for a time window."""
     pair = arguments.get("pair", False)
     required = arguments.pop("required", False)
     return make_click_option(
@@ -362,7 +371,7 @@ def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def open_judging_run(request: Request) -> Run | None:
-    """Open the history with which cards are judged; return None if no history is given."""
+    """Open the history by which cards are judged; None if no history is given."""
     if not request.history:
         return None
     # Imported here to keep start-up fast.
@@ -418,6 +427,24 @@ def repeat_command() -> list[str]:
     ):
         words = insert_options(words, ["--overwrite"])
     return [*(["env", *variables] if variables else []), "d2rpick", *words]
+
+
+def write_times(**values: Any) -> tuple[str, ...]:
+    """Return options as typed; those without a value are left out.
+
+    Examples
+    --------
+    >>> write_times(td=0.5, td_window=None, switched=("a", "b"))
+    ('--td', '0.5', '--switched', 'a', '--switched', 'b')
+    """
+    return tuple(
+        word
+        for name, value in values.items()
+        if value is not None
+        for word in write_option(
+            name, value, many=isinstance(value, tuple) and name not in _PAIRS
+        )
+    )
 
 
 def insert_options(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:

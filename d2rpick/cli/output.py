@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TextIO
 
 import click
 
-from d2rpick.api.cards import Cards, JudgedCard
-from d2rpick.api.request import OPTIONS, Request
+from d2rpick.api.option_names import replace_arguments
 from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,
@@ -22,13 +21,15 @@ from d2rpick.base.errors import (
     make_printable,
 )
 from d2rpick.base.files import write_as_a_whole
-from d2rpick.base.options import UNLIMITED, list_options, make_option, make_option_name
+from d2rpick.base.options import UNLIMITED, make_option, make_option_name
 from d2rpick.cli.progress import is_on_terminal, show_reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
+    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
     from d2rpick.report.formats import DisplayOptions
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 OBJECTION = 1
 # Smallest width of a terminal for which a result is wrapped [columns].
 _NARROWEST: Final = 40
-# Output formats by the suffix of the file name.
+# Output formats, keyed by the suffix of the file name.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # Suffixes of files that users may expect for a report, but that are not supported.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
@@ -49,30 +50,6 @@ _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Options whose names differ from the arguments that messages name in backticks.
-ARGUMENTS: Final = (
-    *OPTIONS,
-    *list_options(Cards),
-    *(
-        "td",
-        "td_window",
-        "tr",
-        "min_rigid",
-        "overwrite",
-        "write_as",
-        "done",
-        "before",
-        "wait",
-        "min_mean_energy",
-    ),
-)
-_OTHERS: Final = {
-    "parts": "part",
-    "channels": "channel",
-    "replay": "no_verify",
-    "run": "history",
-}
-_FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 # Output forms that already explain why nothing is recommended.
 IN_WORDS: Final = {"table", "markdown"}
 
@@ -129,7 +106,7 @@ class Output:
 
     @property
     def file(self) -> str | None:
-        """Name of the file for the result, or None if the result goes to stdout."""
+        """Name of the file for the result; None if the result goes to stdout."""
         return None if self.output_file == "-" else self.output_file
 
     @property
@@ -138,7 +115,7 @@ class Output:
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Return an output that protects these inputs; raise D2RPickError if it would overwrite a file."""
+        """Return an output that protects these inputs; raise D2RPickError if it would overwrite one of them."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -178,7 +155,7 @@ class Output:
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
-        """Return what a form of output shows in addition to the answer."""
+        """Return what an output form shows in addition to the answer."""
         from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
@@ -193,13 +170,13 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested form."""
         now = self.shown(**display_options)
-        text = replace_arguments_for_people(
+        text = name_options_and_wrap(
             answer.text(self.output_format, now), self.output_format, now.width
         )
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
-        """Write the figure and the page if they are requested."""
+        """Write the figure and the page if the user requests them."""
         if self.plot:
             from d2rpick.report import figures
 
@@ -215,7 +192,7 @@ class Output:
     def finish_by_verdict(
         self, decision: VerdictOnPair | None, min_quality: str
     ) -> None:
-        """Exit with code 1 if there is no pair, or its grade is below ``min_quality``; a message names this limit."""
+        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``, which a message names."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -282,7 +259,7 @@ class Output:
             click.echo(content, nl=False)
 
     def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Write the card of an answer with its cautions; return False if there is no card or a window fails."""
+        """Write the card of an answer with its cautions; return False if there is no card or if a window fails."""
         if judged_card is None:
             self.content(b"")
             return False
@@ -291,7 +268,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print what a reader omitted, and the warnings."""
+        """Print notes on what a reader omitted, and the warnings."""
         if self.quiet:
             return
         listed_cautions = list(cautions)
@@ -326,7 +303,7 @@ class Output:
 
 
 def _check_report(name: str | None) -> None:
-    """Raise D2RPickError if the file name of a report implies a format other than HTML."""
+    """Raise D2RPickError if the file name of a report implies another format than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
@@ -404,42 +381,14 @@ def encode_text(text: str) -> bytes:
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
-def replace_arguments(message: str) -> str:
-    """Replace the argument names in a message with the options that set them.
+def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
+    """Replace argument names with options in a result, and wrap a table to ``width`` columns.
 
     Examples
     --------
-    >>> replace_arguments("give it as `after` where it is known")
-    'give it as --after where it is known'
-    """
-    has_names = "`" in message
-    if has_names:
-        return re.sub(
-            r"`(\w+)`", lambda match: find_option(match[1]) or match[0], message
-        )
-    return message
-
-
-def find_option(argument: str) -> str:
-    """Return the option that sets an argument; empty if there is no such option."""
-    name = _OTHERS.get(argument, argument)
-    return f"--{make_option_name(name)}" if name in ARGUMENTS else ""
-
-
-def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
-    """Replace argument names with options in a result for people, and wrap it to ``width`` columns.
-
-    Results for programs keep the argument names.
-
-    Examples
-    --------
-    >>> replace_arguments_for_people("choose with `energy`", "table")
+    >>> name_options_and_wrap("choose with `energy`", "table")
     'choose with --energy'
-    >>> replace_arguments_for_people("choose with `energy`", "json")
-    'choose with `energy`'
     """
-    if form in _FOR_PROGRAMS:
-        return text
     text = replace_arguments(text)
     if form != "table" or not width:
         return text

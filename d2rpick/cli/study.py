@@ -138,6 +138,9 @@ def study(
         lines=[write_row(row, mark) for row in rows]
         if by_line and not streaming
         else [],
+        question=request.repeat()._replace(
+            times=options.write_times(td=td, td_window=td_window), files=sources
+        ),
     )
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
@@ -171,7 +174,7 @@ def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
 
 def _is_unmatched_pattern(name: str) -> bool:
-    """Return True for a name with wildcards that no file or folder has or matches."""
+    """Return True for a name with wildcards that is not itself a file or folder and matches none."""
     return any(sign in name for sign in "*?[") and not os.path.lexists(name)
 
 
@@ -227,7 +230,7 @@ def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) 
 def _choose_farm(
     jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool
 ) -> Farm:
-    """Choose where to compute this number of calls; a single call needs no other process."""
+    """Choose where to compute a number of calls; a single call needs no other process."""
     from d2rpick.base import workers
 
     if scheduler and calls:

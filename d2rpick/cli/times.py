@@ -105,7 +105,7 @@ def _find_unit(ctx: click.Context) -> tuple[str, str]:
 
 
 def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
-    """Return the names of the files of each run that a command line names."""
+    """Return the names of the files of each run on the command line."""
     if history := ctx.params.get(_ONE_RUN):
         return [history]
     names = ctx.params.get(_MANY_RUNS)

@@ -39,7 +39,7 @@ else:
 
 CARDS: Final = tuple(list_options(Cards))
 _PAIR: Final = 2  # Number of values of an option whose value is a pair.
-# Options that apply only together with another option; settings may also give them to commands that lack it.
+# Options that apply only with another option; settings may also set them for commands that lack it.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -58,7 +58,7 @@ class NumberType(FloatType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Read a number; the error names the value found and the values allowed."""
+        """Read a number; the error message contains the value found and the values allowed."""
         try:
             number = float(value)
         except ValueError:
@@ -77,6 +77,8 @@ class NumberType(FloatType):
             )
             if param and param.nargs == _PAIR and not hint:
                 hint = ": two numbers were expected"
+            if param and param.metavar == "T" and not hint:
+                hint = ", a time in the unit of the run was expected"
             self.fail(f"{value!r} is not a number{hint}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
@@ -120,7 +122,7 @@ class OutputFile(File):
 
 
 class Program(click.types.StringParamType):
-    """A command to be started, or the address of a computing cluster: a settings file must not set either."""
+    """A command to be started, or the address of a computing cluster; a settings file must not set either."""
 
 
 class CompletedText(click.types.StringParamType):
@@ -149,7 +151,7 @@ class CompletedText(click.types.StringParamType):
 
 
 class Names(CompletedText):
-    """Names, separated by semicolons in an environment variable, since labels may contain blanks."""
+    """Names, separated by semicolons in an environment variable, because names may contain blanks."""
 
     envvar_list_splitter = ";"
 
@@ -185,7 +187,7 @@ class RuleIds(CompletedText):
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Offer the rules that begin with this prefix in upper or lower case."""
+        """Offer the rules that begin with this prefix, in upper or lower case."""
         return super().shell_complete(ctx, param, incomplete.upper())
 
 
@@ -199,7 +201,7 @@ class ChannelNames(Names):
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
-    """Open the files on the command line; return None if they are not a run."""
+    """Open the files on the command line; None if they are not a run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
@@ -262,7 +264,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
 def read_settings(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Return the option values, by name, in the ``table`` of settings that was read from ``source``.
+    """Return the option values, keyed by name, in the ``table`` of settings that was read from ``source``.
 
     Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
     context with the command line and the environment: settings that these exclude are ignored.
@@ -295,7 +297,7 @@ def read_settings(
 def _list_given_settings(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
-    """Yield the options of a command in the settings, with value and position; unknown keys are refused."""
+    """Yield the options of a command in the settings, with value and position; refuse unknown keys."""
     tables = {
         name: entry for name, entry in table.items() if isinstance(entry, Mapping)
     }
@@ -397,7 +399,7 @@ def is_used(
     given_values: Mapping[str, Any],
     all_values: Mapping[Any, Any],
 ) -> bool:
-    """Return True if a setting applies together with the ``given`` options and all options in ``asked``."""
+    """Return True if a setting applies, given the options with ``given_values`` and all options in ``all_values``."""
     if any(name in given_values for name in getattr(option, "instead_of", ())):
         return False
     if option.name in CARDS and (
@@ -435,5 +437,5 @@ def list_words(ctx: click.Context) -> Sequence[str]:
 
 
 def spell_option(option: click.Option) -> str:
-    """Return the long name of an option, as in the settings."""
+    """Return the long name of an option, in the form used in the settings."""
     return max(option.opts, key=len)[2:]

@@ -20,7 +20,7 @@ _HEAD = 64 * 1024
 
 
 def read_inventory(path: str) -> Inventory:
-    """Read the parts and elements of a main deck and its includes.
+    """Read the parts and elements of a main deck and of its includes.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    # Imported here because these modules import numpy.
+    # The modules are imported here, because they import numpy.
     from d2rpick.deck import (
         ls_dyna_inventory,
         radioss_files,
@@ -55,7 +55,7 @@ def read_inventory(path: str) -> Inventory:
 
 
 def find_time_unit(path: str) -> str:
-    """Return the time unit that a Radioss run names for deck and computation; empty if it names none or two units.
+    """Return the time unit that a Radioss run names for deck and computation; empty if there is none or two differ.
 
     Decks of LS-DYNA name no units.
 
@@ -76,7 +76,7 @@ def find_time_unit(path: str) -> str:
 
 
 def find_main_decks(folder: str) -> list[str]:
-    """Return the paths of the main decks in a folder and its subfolders.
+    """Return the paths of the main decks in a folder and in its subfolders.
 
     A main deck contains ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
     folder includes it. Hidden files and folders are ignored.
@@ -135,11 +135,11 @@ def _has_parts(path: str) -> bool:
 
         return bool(read_parts(read_deck(path)).materials)
     except DeckError:
-        return True  # The code that reads the deck reports this error.
+        return True  # The error is reported when the deck is read.
 
 
 def _list_includes(path: str) -> list[str]:
-    """Return the names of the files that a deck includes; none if it cannot be read, which the check reports."""
+    """Return the names of the files that a deck includes; empty if the deck cannot be read, which its check reports."""
     # Imported here to keep start-up fast.
     from d2rpick.deck import radioss_files, reader
 
@@ -154,7 +154,7 @@ def _list_includes(path: str) -> list[str]:
 
 
 def _list_files(folder: str) -> Iterator[str]:
-    """Yield the paths of all visible files in a folder and its subfolders."""
+    """Yield the paths of all visible files in a folder and in its subfolders."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     for root, folders, names in os.walk(folder):
@@ -190,4 +190,4 @@ def _read_head(path: str) -> bytes:
     try:
         return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
     except DeckError:
-        return head  # The check of the deck reports this error.
+        return head  # The error is reported by the check of the deck.

@@ -1,4 +1,4 @@
-"""Represent cards (a keyword with data lines in fields) and the parameters (``&name``) that their fields use.
+"""Represent cards (a keyword with data lines in fields) and the parameters (``&name``) used in their fields.
 
 Numbers are evaluated on request. Each field knows its place in the file, and each parameter knows its definitions and
 where it is visible.
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import Block
 
 
-STANDARD, LONG = 10, 20  # Width of a field in standard and in long format [characters].
+STANDARD, LONG = 10, 20  # Width of a field in standard and long format [characters].
 # Pattern of the text between commas. A comma inside an expression, as in <max(1,2)>, does not separate fields.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
@@ -61,12 +61,12 @@ class CardField(NamedTuple):
 
     @property
     def line(self) -> int:
-        """Return the line number in the file; it is computed on request."""
+        """Return the line number in the file, which is computed on request."""
         return self.block.line + self.distance
 
     @property
     def at(self) -> str:
-        """Return the file and line in the form that messages use."""
+        """Return the file and line in the form used in messages."""
         return f"{self.file}:{self.line}"
 
 
@@ -76,7 +76,7 @@ Problem = tuple[CardField, str]
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """The value of a field; if ``value`` is only the default, ``problem`` gives the reason.
+    """The value of a field; if ``value`` is only the default, ``problem`` contains the reason.
 
     ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
@@ -190,12 +190,12 @@ class Card:
 
     @property
     def at(self) -> str:
-        """Return the file and line of the keyword in the form that messages use."""
+        """Return the file and line of the keyword in the form used in messages."""
         return f"{self.file}:{self.line}"
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Return all data lines, including blank lines, but no comments."""
+        """Return all data lines, including blank lines but no comments."""
         return tuple(
             [
                 Row(self.block, distance, text, self.width)
@@ -210,7 +210,7 @@ class Card:
 
     @cached_property
     def data(self) -> tuple[Row, ...]:
-        """Return the data lines that are not blank, except the title line of a keyword with ``_TITLE``."""
+        """Return the data lines that are not blank, without the title line of a keyword with ``_TITLE``."""
         if "TITLE" in self.name:
             return tuple(row for row in self.rows[1:] if not row.blank)
         return self.lines
@@ -226,7 +226,7 @@ class Card:
 
     @property
     def here(self) -> CardField:
-        """Return the keyword as a field, for messages."""
+        """Return the keyword as a field, for use in messages."""
         return CardField(f"*{self.name}", self.block, 0, 1)
 
     def real(self, row: Row, column: CardColumn, default: float = 0.0) -> Value[float]:
@@ -238,7 +238,7 @@ class Card:
         return self._number(row, column.position, default, int)
 
     def numbers(self, row: Row, line: DataLine) -> list[Any]:
-        """Read all columns of a line whose columns are all numbers."""
+        """Read all columns of a line in which every column is a number."""
         return [
             self.real(row, column)
             if column.kind is float
@@ -249,7 +249,7 @@ class Card:
     def _number(
         self, row: Row, position: int, default: T, kind: Callable[[float], T]
     ) -> Value[T]:
-        """Read a field as a number of one type; parameters in the field are evaluated."""
+        """Read a field as a number of the given type; parameters in the field are evaluated."""
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
@@ -264,14 +264,14 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; return None if it is not positive, or if its include file has other units."""
+        """Read a positive number; None if the number is not positive, or if its include file has other units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
         return number.value
 
     def word(self, row: Row, column: CardColumn, default: str = "") -> Value[str]:
-        """Read a word in upper case."""
+        """Read a word and return it in upper case."""
         text = row.cell(column.position)
         return Value(
             self.scope.text(text).upper() or default,
@@ -323,7 +323,7 @@ class Scope:
         self._seen = self
 
     def as_of_now(self) -> Scope:
-        """Return the scope that applies at the current position; later definitions do not change its values."""
+        """Return the scope at the current position; later definitions do not change its values."""
         if self._seen._known != self._whole._count:
             self._seen = Scope(self._outer)
             self._seen._local, self._seen._whole, self._seen._known = (
@@ -334,7 +334,7 @@ class Scope:
         return self._seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:
-        """Return all definitions of ``name`` (lower case), including later ones.
+        """Return all definitions of ``name`` (in lower case), including later ones.
 
         The definitions come from the innermost scope that has one before the current position.
         """
@@ -351,7 +351,7 @@ class Scope:
         )
 
     def definition(self, name: str) -> Definition | None:
-        """Return the definition that applies; None if the parameter is not yet defined."""
+        """Return the definition that applies; None if the parameter is not defined yet."""
         earlier = [
             definition
             for definition in self.definitions(name)
@@ -383,7 +383,7 @@ class Scope:
         return parse_number(text)
 
     def text(self, text: str) -> str:
-        """Return the text of a field with each reference ``&name`` to a character parameter replaced by its text."""
+        """Return the text of a field in which each reference ``&name`` to a character parameter is replaced."""
 
         def value(reference: re.Match[str]) -> str:
             definition = self.definition(reference[1].lower())
@@ -465,7 +465,7 @@ class Scope:
 def _read_definitions(
     rows: Sequence[Row], options: set[str]
 ) -> Iterator[tuple[Row, str, str]]:
-    """Yield row, name with type letter, and text of the value of each definition on a parameter card."""
+    """Yield row, name with type letter, and value text of each definition on a parameter card."""
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return

@@ -1,4 +1,4 @@
-"""Describe data lines by columns, each declared once with name, type and width, to read and to write them.
+"""Describe data lines by columns, each declared once with name, type and width, for reading and writing them.
 
 The lines of LS-DYNA keywords are declared in `ls_dyna_columns`, those of Radioss blocks in `radioss_columns`.
 """
@@ -32,11 +32,11 @@ class CardColumn(NamedTuple):
 
     @property
     def position(self) -> int:
-        """Return the number of fields of 10 characters that precede this column."""
+        """Return the number of 10-character fields that precede this column."""
         return self.start // WIDTH
 
     def cut(self, line: str) -> str:
-        """Return the text of this column in a line, with its blanks."""
+        """Return the text of this column in a line, including blanks."""
         return line[self.start : self.start + self.width]
 
     def format(self, value: Cell) -> str:
@@ -44,7 +44,7 @@ class CardColumn(NamedTuple):
         return f"{value!s:>{self.width}}"
 
     def put(self, line: str, value: Cell) -> str:
-        """Return a line with another value in this column."""
+        """Return a line in which the value of this column is replaced."""
         before = line[: self.start].ljust(self.start)
         return f"{before}{self.format(value)}{line[self.start + self.width :]}"
 
@@ -107,7 +107,7 @@ class DataLine:
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
-        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, by the type of its column."""
+        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, as its column requires."""
         assert values.keys() <= self._columns.keys()
         defaults: dict[Kind, Cell] = {int: 0, float: 0.0, str: ""}
         return "".join(
@@ -128,12 +128,12 @@ class DataLine:
 
 
 def cut_fields(line: str) -> list[str]:
-    """Return the texts of all fields of 10 characters in a line that lists ids."""
+    """Return the texts of all 10-character fields in a line that lists ids."""
     return [line[at : at + WIDTH].strip() for at in range(0, len(line), WIDTH)]
 
 
 def write_list(line: DataLine, values: Iterable[Cell]) -> Iterator[str]:
-    """Yield lines that list values; each line is filled up to its number of columns."""
+    """Yield lines that list values; each line except the last has all of its columns filled."""
     columns = list(line)
     cells = list(values)
     for first in range(0, len(cells), len(columns)):

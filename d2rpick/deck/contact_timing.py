@@ -1,4 +1,4 @@
-"""Find the times of force switches that make parts rigid in planned windows.
+"""Find the times of force-controlled switches that make parts rigid in planned windows.
 
 These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
 of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
@@ -37,7 +37,7 @@ class Pushes(NamedTuple):
 
 
 class ForceTiming(NamedTuple):
-    """Times of a force switch, and the windows in which it makes parts rigid.
+    """Times of a force-controlled switch, and the windows in which it makes parts rigid.
 
     The switch acts between ``earliest`` and ``latest``. ``wait`` is TIME3 of the set that makes parts deformable, or
     Tdelay. ``offset`` is a distance, 0 if the card has no offset.
@@ -146,12 +146,12 @@ def _find_least_wait(
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Return the first span that begins at or after a time; if there is no such span, return infinite times."""
+    """Return the first span that begins at or after a time; if there is none, return infinity twice."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Return the last span that ends at or before a time; if there is no such span, return minus infinity twice."""
+    """Return the last span that ends at or before a time; if there is none, return minus infinity twice."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Times
 
-# Smallest number of time steps in a rigid window, because parts are released up to one time step late.
+# Smallest number of time steps in a rigid window; it must be high, because parts are released up to one step late.
 # Each window has its own time-step limit, so that later windows do not change the run before them.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-# Largest number of engine runs, which has two digits in the names of time history files.
+# Largest number of engine runs; this number has two digits in the names of time history files.
 MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end [time], and the time-step limit if bodies are rigid, else None."""
+    """An engine run: its number, its end [time], and its time-step limit [time] (None if no bodies are rigid)."""
 
     number: int
     stop: float
@@ -29,7 +29,7 @@ class EngineFile(NamedTuple):
 
 
 def choose_step_cap(tr: float, td: float) -> float:
-    """Return the largest time step while the parts are rigid from tr to td [time]."""
+    """Return the time-step limit while the parts are rigid from tr to td [time]."""
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
@@ -79,7 +79,7 @@ def write_numbers(ids: Sequence[int]) -> Iterator[str]:
 def write_engine_lines(
     leg: EngineFile, name: str, ids: Sequence[int], other_nodes: Sequence[int]
 ) -> Iterator[str]:
-    """Yield the lines of an engine file that activates these main nodes; ``other_nodes`` stay deactivated."""
+    """Yield the lines of an engine file that activates the bodies ``ids``; ``other_nodes`` stay inactive."""
     yield f"/RUN/{name}/{leg.number}"
     yield RUN.write(Tstop=leg.stop)
     if leg.cap is not None and ids:

@@ -24,9 +24,9 @@ _TOKEN: Final = (  # This pattern is compiled at its first use, to keep start-up
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # Reference to a parameter, such as &tend.
-# Largest depth of nested parentheses, so that the recursion cannot exhaust Python's stack.
+# Largest depth of nested parentheses; the limit prevents the recursion from exhausting Python's stack.
 _DEEPEST = 50
-LONGEST = 40  # Largest number of characters of a number in a deck.
+LONGEST = 40  # Largest number of characters in a number of a deck.
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -34,7 +34,7 @@ _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi
 
 
 class ExpressionError(Exception):
-    """Raised inside the deck reader for a string that is not a number; the message says why."""
+    """Raised inside the deck reader for a string that is not a number; the message gives the reason."""
 
 
 @lru_cache(4096)  # Results are cached, because most fields are blank or 0.
@@ -79,7 +79,7 @@ def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | 
 def convert_text(
     kind: Callable[[float], Any], text: str, value: Callable[[str], Number]
 ) -> tuple[Any, str]:
-    """Convert a string to a number of a type (int or float).
+    """Convert a string to a number of the given type (int or float).
 
     Return the number and an empty string, or None and the reason.
 
@@ -120,7 +120,7 @@ def find_parameters(text: str) -> tuple[str, ...]:
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
-    """Evaluate an expression; ``lookup`` returns the value of a parameter by its lower-case name.
+    """Evaluate an expression; ``lookup`` returns the value of a parameter for its lower-case name.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
 
 
 def _round_half_away(x: Number) -> int:
-    """Round to the nearest integer; halves are rounded away from zero."""
+    """Round to the nearest integer, with halves rounded away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
@@ -183,7 +183,7 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
 
 
 def _divide(x: Number, y: Number) -> Number:
-    """Divide as Fortran does: integers give an integer, rounded towards zero."""
+    """Divide as Fortran does: two integers give an integer, rounded towards zero."""
     if isinstance(x, int) and isinstance(y, int):
         whole = abs(x) // abs(y)
         return whole if (x < 0) == (y < 0) else -whole
@@ -191,12 +191,12 @@ def _divide(x: Number, y: Number) -> Number:
 
 
 def _raise_to_power(x: Number, y: Number) -> Number:
-    """Raise a number to a power as Fortran does: integers give an integer."""
+    """Raise a number to a power as Fortran does: two integers give an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
 
-# Precedence of each operator, and the function that applies it.
+# Precedence of each operator, and the function that applies the operator.
 _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
     "+": (1, operator.add),
     "-": (1, operator.sub),
@@ -216,7 +216,7 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
-        """Evaluate the expression, which must end with the text."""
+        """Evaluate the whole expression, which must end at the end of the text."""
         value = self.nested()
         if self.tokens[0]:
             raise self.unexpected()
@@ -249,7 +249,7 @@ class _Parser:
         return value
 
     def signed(self) -> Number:
-        """Evaluate a value with any number of signs before it."""
+        """Evaluate a value preceded by any number of signs."""
         negative = False
         while self.tokens[0] in ("+", "-"):
             negative ^= self.tokens.pop(0) == "-"

@@ -1,4 +1,4 @@
-"""Evaluate force switches (CODE 1 to 4 of LS-DYNA) for known contact times.
+"""Evaluate force-controlled switches (CODE 1 to 4 of LS-DYNA) for known contact times.
 
 Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
 force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with
@@ -39,7 +39,7 @@ def follow_pair(
     end: float,
     second_contacts: Spans | None = None,
 ) -> list[tuple[float, float | None]]:
-    """Return the windows in which a set and its pair make their parts rigid.
+    """Return the windows in which a switch set and its counterpart make their parts rigid.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _follow_switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which two paired sets switch alternately, each with True if it makes the parts rigid."""
+    """Yield the times at which two paired sets switch alternately, each with True if the parts become rigid."""
     ready = 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
@@ -111,7 +111,7 @@ def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
 def find_delay_without_chatter(
     windows: Sequence[tuple[float, float]], contacts: Spans
 ) -> float | None:
-    """Return the smallest TIME3 of the releasing set with which the pair switches only in these windows.
+    """Return the smallest TIME3 of the releasing set with which the pair switches in these windows only.
 
     Each contact before a window must be over within this time; None if no contact precedes any window.
     """
@@ -125,7 +125,7 @@ def find_delay_without_chatter(
 def _find_cluster(
     contacts: Spans, windows: Sequence[tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return the time span from the first to the last contact after the previous window."""
+    """Return the time span from the first to the last contact since the previous window."""
     last_end = contacts[-1][1]
     last_window_end = max(
         (td for _, td in windows if td <= last_end), default=-math.inf

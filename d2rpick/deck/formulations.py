@@ -1,4 +1,4 @@
-"""Map the formulation numbers of elements to names and to the class that defines their cost.
+"""Map the formulation numbers of elements to names and to the class that determines their cost.
 
 Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.parts.cost`).
 A formulation that was not measured has the class of a similar one, with ``measured`` False.
@@ -11,10 +11,10 @@ from typing import Final
 from d2rpick.deck.model import Formulation
 
 BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "spring"
-# Number of integration points in each layer of a shell, by formulation class.
+# Number of integration points in each layer of a shell, keyed by formulation class.
 _IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
-# Formulation of Radioss quadrilaterals by Ishell (source: Altair's public help for /PROP/TYPE1).
+# Formulation of Radioss quadrilaterals, keyed by Ishell (source: Altair's public help for /PROP/TYPE1).
 _ISHELL: Final = {
     **{number: Formulation(f"BT (Ishell {number})", BT) for number in (1, 2, 3, 4)},
     12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
@@ -23,7 +23,7 @@ _ISH3N: Final = {
     **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
-# Name of Radioss solids by Isolid. They form one class, because the measured costs of 24, 17 and 1 are equal.
+# Name of Radioss solids, keyed by Isolid. They form one class, because the measured costs of 24, 17 and 1 are equal.
 _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
@@ -32,7 +32,7 @@ _ISOLID: Final = {
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
-# Formulation name and class of LS-DYNA shells by ELFORM; the class follows from the integration points.
+# Formulation name and class of LS-DYNA shells, keyed by ELFORM; the class follows from the integration points.
 _ELFORM_SHELL: Final = {
     1: ("Hughes-Liu", BT), 2: ("Belytschko-Tsay", BT), 3: ("BCIZ triangle", BT), 4: ("C0 triangle", BT),
     5: ("membrane", BT), 6: ("S/R Hughes-Liu", QBAT), 7: ("S/R co-rotational Hughes-Liu", QBAT),

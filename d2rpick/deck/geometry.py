@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-# Number of elements processed at once, whose arrays fit into the processor's cache.
+# Number of elements that are processed at once; their arrays fit into the processor's cache.
 _PIECE: Final = 1 << 14
-# Nodes of each face of a brick, in the order seen from outside.
+# Nodes of each face of a brick, in order as seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),
@@ -54,7 +54,7 @@ class _ElementTotals(NamedTuple):
 def compute_masses_and_steps(
     inventory: Inventory,
 ) -> dict[int, tuple[float | None, float | None]]:
-    """Return the mass [mass] and the smallest stable time step [time] of every part that has elements.
+    """Return the mass [mass] and the smallest stable time step [time] of every part with elements, keyed by part id.
 
     None if the deck does not define the density, modulus, thickness or position of every element of the part.
     """
@@ -84,7 +84,7 @@ def compute_masses_and_steps(
 
 
 def _compute_mass(data: PartData, measured: Sequence[_ElementTotals]) -> float | None:
-    """Return the mass of a part; None if it is unknown."""
+    """Return the mass of a part [mass]; None if it is unknown."""
     mass = 0.0
     for elements in measured:
         if elements.kind == "spring" and data.section.mass is not None:
@@ -99,7 +99,7 @@ def _compute_mass(data: PartData, measured: Sequence[_ElementTotals]) -> float |
 
 
 def _compute_step(data: PartData, measured: Sequence[_ElementTotals]) -> float | None:
-    """Return the smallest stable time step of a part; None if it is unknown."""
+    """Return the smallest stable time step of a part [time]; None if it is unknown."""
     steps: list[float] = []
     for elements in measured:
         speed = _compute_wave_speed(elements.kind, data.material)
@@ -121,7 +121,7 @@ def _get_depth(kind: str, data: PartData) -> float | None:
 
 
 def _compute_wave_speed(kind: str, material: Material | None) -> float | None:
-    """Return the wave speed in elements of a kind; None if it is unknown."""
+    """Return the wave speed in elements of a kind [length/time]; None if it is unknown."""
     if material is None or material.density is None or material.modulus is None:
         return None
     plain = material.modulus / material.density
@@ -149,7 +149,7 @@ def compute_sizes_and_lengths(
 
 
 def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the size of each element, and the length that a wave crosses, both (n,); NaN if unknown."""
+    """Return the size of each element, and the length that a wave crosses in a time step, both (n,); NaN if unknown."""
     if kind in _LINES:
         length = np.linalg.norm(
             coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1
@@ -166,7 +166,7 @@ def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals,
 
 
 def _measure_surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the areas of shells, and the lengths that a wave crosses."""
+    """Return the areas of shells, and the lengths that a wave crosses in a time step."""
     third = nodes[:, 2]
     last = nodes[:, 3] if nodes.shape[1] > 3 else third
     last = np.where(last == NO_NODE, third, last)
@@ -195,7 +195,7 @@ def _compute_cross_products(a: Reals, b: Reals) -> Reals:
 
 
 def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of tetrahedra, and the lengths that a wave crosses."""
+    """Return the volumes of tetrahedra, and the lengths that a wave crosses in a time step."""
     corners = coordinates[nodes[:, :4]]
     volume = np.abs(_compute_tetrahedron_volumes(corners, (0, 1, 2, 3)))
     faces = np.stack(
@@ -208,7 +208,7 @@ def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals
 
 
 def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of solids, and the lengths that a wave crosses; nodes of a brick may repeat or be missing."""
+    """Return the volumes of solids, and the wave-path lengths; nodes of a brick may repeat or be missing."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
         eight[:, column] = np.where(
@@ -223,7 +223,7 @@ def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _compute_volume_below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
-    """Return the signed volumes between the first corner and a face; their sum is the volume, even if nodes repeat."""
+    """Return the signed volumes between the first corner and a face; the sum over all faces is the volume."""
     a, b, c, d = face
     return _compute_tetrahedron_volumes(
         corners, (0, a, b, c)
@@ -241,7 +241,7 @@ def _compute_tetrahedron_volumes(
 
 
 class PartPosition(NamedTuple):
-    """Position, inertia and watched nodes of a part in the deck.
+    """Position, inertia and watched nodes of a part, according to the deck.
 
     ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
     [length^2]. ``watched`` maps the places of its nodes with written motion (in the node table) to their coordinates.
@@ -253,7 +253,7 @@ class PartPosition(NamedTuple):
 
 
 class _PartShare(NamedTuple):
-    """Totals over the elements of a part: size (), first moments (3,) and second moments (3, 3)."""
+    """Totals over the elements of a part: size, first moments (3,) and second moments (3, 3)."""
 
     size: float
     first: Reals
@@ -261,7 +261,7 @@ class _PartShare(NamedTuple):
 
 
 class Placement:
-    """Positions of the parts of a deck, computed on request."""
+    """Positions of the parts of a deck, which are computed on request."""
 
     def __init__(self, inventory: Inventory) -> None:
         self._inventory = inventory
@@ -301,7 +301,7 @@ class Placement:
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
     def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
-        """Return the positions (3,) of the watched nodes of given parts by their numbers [length]."""
+        """Return the positions (3,) of the watched nodes of given parts, keyed by node number [length]."""
         inventory = self._inventory
         numbers = dict(
             zip(inventory.watched.tolist(), inventory.watched_ids.tolist(), strict=True)
@@ -322,7 +322,7 @@ class Placement:
         return np.asarray(self._inventory.coordinates[nodes[nodes != NO_NODE]])
 
     def hanging_together(self, parts: Collection[int]) -> frozenset[int]:
-        """Return the largest group of these parts that are connected by shared nodes."""
+        """Return the largest group of these parts that is connected by shared nodes."""
         groups = self._inventory.groups(parts)
         return frozenset(max(groups, key=self._inventory.rigid_nodes, default=()))
 
@@ -330,7 +330,7 @@ class Placement:
 def _compute_shares(
     elements: Elements, coordinates: Reals
 ) -> Iterable[tuple[int, _PartShare]]:
-    """Return what the elements of one kind contribute to the position of each part."""
+    """Return the contributions of the elements of one kind to the position of each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:
@@ -345,7 +345,7 @@ def _compute_shares(
     first = np.stack(
         [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
     )
-    # Coordinates relative to the centre of the part are used, because digits are lost far from the origin.
+    # Coordinates are taken relative to the centre of the part, because digits are lost far from the origin.
     x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
         np.bincount(part_index, sizes * a * b)

@@ -38,7 +38,7 @@ SECTION_SIZES: Final = DataLine(reals("FIRST"))
 MATERIAL: Final = DataLine(words("MID"), reals("RO E PR"))
 RIGID_MATERIAL: Final = DataLine(reals("CMO"), integers("CON1 CON2"))
 
-# Lines of sets, and the line that contains the id of a keyword with the option ID.
+# Lines of sets, and the line with the id of a keyword that has the option ID.
 SET: Final = DataLine(integers("SID"))
 SET_MEMBERS: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8"))
 SET_COLUMN: Final = DataLine(integers("ID1"))
@@ -111,19 +111,19 @@ PARAMETERS: Final = DataLine(
 
 
 def make_node_line(id_width: int, real_width: int) -> DataLine:
-    """Return the line of *NODE, whose widths depend on the format of the deck."""
+    """Return a data line of *NODE, whose column widths depend on the format of the deck."""
     return DataLine(
         integers("NID", id_width), reals("X Y Z", real_width), integers("TC", id_width)
     )
 
 
 def make_element_line(width: int, node_count: int) -> DataLine:
-    """Return the line of *ELEMENT with this number of nodes; its width depends on the format of the deck."""
+    """Return a data line of *ELEMENT with ``node_count`` nodes, whose width depends on the format of the deck."""
     nodes = " ".join(f"N{number}" for number in range(1, node_count + 1))
     return DataLine(integers(f"EID PID {nodes}", width))
 
 
 def make_watched_line(width: int, node_count: int) -> DataLine:
-    """Return the line of *DATABASE_HISTORY_NODE with this number of nodes."""
+    """Return a data line of *DATABASE_HISTORY_NODE with ``node_count`` node ids."""
     nodes = " ".join(f"ID{number}" for number in range(1, node_count + 1))
     return DataLine(integers(nodes, width))

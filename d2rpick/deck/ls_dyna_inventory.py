@@ -73,7 +73,7 @@ _OPTIONS: Final = {
     ),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# Keywords that define no elements and change neither the mass nor the cost of a part.
+# Keywords that define no elements, and change neither the mass nor the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
 _TEN: Final = 10  # Number of nodes in the second line of a solid element.
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
@@ -86,7 +86,7 @@ _DAMPERS: Final = (
 )
 _AIRBAG: Final = ("MAT_FABRIC", "MAT_034")
 _VOID: Final = ("MAT_NULL", "MAT_009")
-# Material keywords whose lines begin with density, Young's modulus and Poisson's ratio, by name and number.
+# Material keywords, by name and number, whose lines begin with density, Young's modulus and Poisson's ratio.
 _ELASTIC: Final = {
     *(
         "ELASTIC",
@@ -194,7 +194,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         _build_parts(deck, parts, mesh),
         mesh.elements,
         mesh.coordinates,
-        notes,
+        (*notes, *_note_switching_cards(deck)),
         parts.all_known and not notes,
         joints=place_nodes(joints.found, mesh.table),
         ties=joints.unknown,
@@ -206,6 +206,15 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
             deck, parts, (ids, coordinates, codes)
         ).placed(mesh.table),
     )
+
+
+def _note_switching_cards(deck: Deck) -> Iterator[str]:
+    """Yield a note on the first card with which the deck already switches parts."""
+    for card in deck.named("DEFORMABLE_TO_RIGID")[:1]:
+        yield (
+            f"{card.at}: the deck already switches parts with *{card.name}; remove its switching cards before you add "
+            "others"
+        )
 
 
 def find_shared_nodes(
@@ -235,7 +244,7 @@ def find_shared_nodes(
 
 
 def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
-    """Return, by node id, the first of ``parts`` that contains the node."""
+    """Return the first of ``parts`` that contains each node, keyed by node id."""
     part_by_node: dict[int, int] = {}
     for part, node in _list_nodes(cards, parts):
         part_by_node.setdefault(node, part)
@@ -245,7 +254,7 @@ def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int,
 def find_parts_of_nodes(
     cards: Sequence[Card], nodes: Collection[int]
 ) -> dict[int, set[int]]:
-    """Return, for each of the given nodes, the parts whose elements contain the node."""
+    """Return the parts whose elements contain each of the given nodes, keyed by node id."""
     parts_by_node: dict[int, set[int]] = {}
     wanted = {*nodes}
     for card in cards:
@@ -297,14 +306,14 @@ def _has_moved_nodes(deck: Deck) -> bool:
 
 
 def _list_notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
-    """Yield notes on elements that may be missing."""
+    """Yield notes on elements that may be missing from the inventory."""
     yield from (
         f"{card.at}: elements of *{card.name} are not read"
         for card in cards
         if not _is_readable(card)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in deck.unread
     )
     for block in deck.encrypted:
@@ -320,7 +329,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
     """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        # Seat-belt keywords that define no elements: slip ring, retractor, sensor and so on.
+        # Seat-belt keywords for slip rings, retractors, sensors and so on define no elements.
         fitting = card.name.startswith("ELEMENT_SEATBELT_")
         if (
             card.name.startswith("ELEMENT_")
@@ -376,7 +385,7 @@ def _read_elements(
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
             )
-        # A row with an element, a part and enough nodes is an element; other rows belong to options.
+        # A row with an element id, a part id and enough nodes is an element; other rows belong to options.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
@@ -387,7 +396,7 @@ def _read_elements(
 
 
 def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
-    """Join each line that contains element id and part id with the line of nodes below it.
+    """Join each line with element id and part id to the line of nodes below it.
 
     Return also a last line whose nodes are missing.
     """
@@ -439,7 +448,7 @@ def _read_codes(lines: Lines, fields: Layout) -> Integers:
 
 
 def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData]:
-    """Return the data of all parts by part id."""
+    """Return the data of all parts, keyed by part id."""
     kinds = mesh.kinds
     sections = read_sections(deck)
     materials = dict(_read_materials(deck, parts))
@@ -460,7 +469,7 @@ def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData
 def _build_section(
     card: SectionCard | None, kinds: set[str], material: Material | None
 ) -> Section:
-    """Return the section of a part with the formulations of its elements."""
+    """Return the section of a part, with the formulations of its elements."""
     formulations_by_kind: dict[str, Formulation] = {}
     for kind in sorted(kinds):
         formulation = formulations.find_ls_dyna_formulation(

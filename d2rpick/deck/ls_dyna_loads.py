@@ -1,4 +1,4 @@
-"""Read supports, prescribed motion, gravity and joints of an LS-DYNA deck.
+"""Read supports, prescribed motions, gravity and joints from an LS-DYNA deck.
 
 Joints connect parts that share no nodes: welds, nodal rigid bodies, extra nodes and ties. While a part is rigid, such a
 constraint on it must be deleted, as a node cannot obey two (the vendor's keyword data for NRBF and NCSF of the
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
 
-_PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP that name a part or a node set.
+_PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP for a part and for a node set.
 # Beginnings of further keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = (
     *(
@@ -84,17 +84,17 @@ CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))
 _ALONG: Final = {f"LOAD_BODY_{letter}": axis for axis, letter in enumerate("XYZ")}
 _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
-# Values of DOF that add a second line to a prescribed motion.
+# Values of DOF for which a prescribed motion has a second line.
 _OWN_CENTRE: Final = (9, 10, 11)
-_RELATIVE: Final = 4  # Value of VAD that adds a second line to a prescribed motion.
-# A node lies on the plane of a *CONSTRAINED_GLOBAL if its distance is below this share of the model size [-].
+_RELATIVE: Final = 4  # Value of VAD for which a prescribed motion has a second line.
+# Largest distance of a node on the plane of a *CONSTRAINED_GLOBAL, as a fraction of the model size [-].
 _FLAT: Final = 1e-4
 
 
 def read_ls_dyna_boundary(
     deck: Deck, parts: DeckParts, nodes: tuple[Places, Reals, Places]
 ) -> Boundary:
-    """Return supports, prescribed motion and gravity of a deck.
+    """Return supports, prescribed motions and gravity of a deck.
 
     ``nodes`` holds ids, coordinates and codes of fixed translations.
     """
@@ -117,7 +117,7 @@ def read_ls_dyna_boundary(
 
 
 def _describe_card(card: Card) -> str:
-    """Return the keyword of a card with its file and line, for messages."""
+    """Return the keyword of a card with its file and line, for use in messages."""
     return f"*{card.name} ({card.at})"
 
 
@@ -194,7 +194,7 @@ def _read_node_supports(numbers: Places, codes: Places) -> Iterator[Hold]:
 
 
 def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
-    """Return the support of the nodes on a plane that a *CONSTRAINED_GLOBAL fixes."""
+    """Return the support of the nodes on the plane fixed by a *CONSTRAINED_GLOBAL."""
     rows = card.lines
     if rows:
         code, normal = (
@@ -338,7 +338,7 @@ def _read_body_load(
         return Gravity(None, ())
     scale = card.real(row, BODY_LOAD["SF"])
     ordinates = curves.get(curve.value + card.transform.rest, ())
-    # The sign is negative, because the card accelerates the ground.
+    # The sign is negative, because the card accelerates the ground instead of the parts.
     values = find_plateaus(ordinates, -(scale.value or 1.0))
     if (
         card.transform.scaled

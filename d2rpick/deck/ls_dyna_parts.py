@@ -43,15 +43,15 @@ _EXTRA_LINES: Final = {
     "FIELD": 1,
     "INERTIA": 3,
 }
-# The options AVERAGED and TITLE add no line.
+# Options of *PART that can be read; the options AVERAGED and TITLE add no line.
 _FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # Value of IRCS with which *PART_INERTIA has one more line.
+_ROTATED = 1  # Value of IRCS for which *PART_INERTIA has one more line.
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Cached node sets of each deck.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
-# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 are co-rotational.
+# Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -65,7 +65,7 @@ NOT_TURNED: Final = {
     16: "tetrahedron with 10 nodes",
     17: "tetrahedron with 10 nodes",
 }
-# Number of lines of one section, by kind of element.
+# Number of lines of one section, keyed by kind of element.
 _LINES: Final = {
     "SOLID": 1,
     "DISCRETE": 2,
@@ -107,7 +107,7 @@ _ABLE: Final = (
     "NODE_TO_SURFACE",
 )
 _MOST_ROWS = (
-    # A contact or wall that has no id has at most this number of lines; more lines may define a second contact.
+    # Largest number of lines of a contact or wall without an id; further lines may define a second contact.
     8
 )
 
@@ -124,7 +124,7 @@ class DeckPartSet(NamedTuple):
     problems: tuple[Problem, ...] = ()
 
     def joined(self, further: DeckPartSet) -> DeckPartSet:
-        """Return the union of two sets (``_COLLECT``)."""
+        """Return the union of this set and another set (``_COLLECT``)."""
         return DeckPartSet(
             self.parts + further.parts,
             self.ranges + further.ranges,
@@ -135,7 +135,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Material, title and section of each part, and part sets by id; None stands for a kind of set that cannot be read.
+    """Data of each part, and part sets, keyed by id; a kind of set that cannot be read is None.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -226,9 +226,9 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        # The option ATTACHMENT adds one line, like PRINT.
+        # The option ATTACHMENT adds one line, as PRINT does.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
-    # A composite is one part with a material for each ply, none of which makes the part rigid.
+    # A composite is one part with a material for each ply; none of the materials makes the part rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add_part(card, card.rows[:2], "", parts)
@@ -314,7 +314,7 @@ def _read_set_members(
 
 
 def find_set_nodes(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
-    """Return the nodes of the node set with this number on a card; None if the set is missing or cannot be read."""
+    """Return the nodes of the node set to which a card refers; None if the set is missing or cannot be read."""
     if deck not in _NODE_SETS:
         _NODE_SETS[deck] = {
             id_: ids
@@ -355,7 +355,7 @@ def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
 
 
 class SectionCard(NamedTuple):
-    """A *SECTION as written: its kind and its ELFORM.
+    """A *SECTION card: its kind of element and its ELFORM.
 
     ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
     """
@@ -367,12 +367,12 @@ class SectionCard(NamedTuple):
 
     @property
     def unturned(self) -> str:
-        """Return the formulation of solids whose stresses do not rotate with a rigid body; empty for others."""
+        """Return the formulation of solids whose stresses do not rotate with a rigid body; empty for other elements."""
         return NOT_TURNED.get(self.elform, "") if self.kind == "SOLID" else ""
 
 
 def read_sections(deck: Deck) -> dict[int, SectionCard]:
-    """Return the sections by id."""
+    """Return the sections, keyed by id."""
     return {
         number: section
         for card in deck.named("SECTION")
@@ -381,7 +381,7 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
 
 
 def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
-    """Yield the id and the content of each section of a card."""
+    """Yield the id and the content of each section on a card."""
     kind = card.name.split("_")[1]
     options = card.options(f"SECTION_{kind}")
     rows = card.lines
@@ -407,7 +407,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that may define shared nodes, or the other cards if ``searched`` is False."""
+    """Return the element cards that may define shared nodes, or the other element cards if ``searched`` is False."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -422,7 +422,7 @@ Kind = Literal[
 
 
 class Constraint(NamedTuple):
-    """A constraint: its kind, field, id (0 if it has no id), nodes, and the rigid part to which it belongs."""
+    """A constraint: its kind, field, id (0 if it has none), nodes, and the rigid part to which it belongs."""
 
     kind: Kind
     place: CardField
@@ -432,7 +432,7 @@ class Constraint(NamedTuple):
 
 
 def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
-    """Yield the constraints of the given kinds; their set of nodes is empty if the nodes are unknown."""
+    """Yield the constraints of the given kinds; the set of nodes is empty if the nodes are unknown."""
     for kind in kinds:
         keyword, read_card = _CONSTRAINTS[kind]
         for card in deck.named(keyword):
@@ -442,7 +442,7 @@ def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
 def _read_nodal_rigid_bodies(
     deck: Deck, card: Card, kind: Kind
 ) -> Iterator[Constraint]:
-    """Yield the nodal rigid bodies of a card."""
+    """Yield the nodal rigid bodies on a card."""
     options = card.options(_BODY)
     rows = card.lines
     # Other options add lines, so the keyword defines only one body.
@@ -456,7 +456,7 @@ def _read_nodal_rigid_bodies(
 
 
 def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Yield the extra nodes of a card."""
+    """Yield the extra nodes on a card."""
     for row in card.rows:
         part = card.integer(row, EXTRA_NODES["PID"])
         node_or_set = card.integer(row, EXTRA_NODES["NID"])
@@ -471,7 +471,7 @@ def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint
 
 
 def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Yield the joint of a card."""
+    """Yield the joint on a card."""
     if card.name.startswith(
         (
             "CONSTRAINED_JOINT_STIFFNESS",
@@ -495,7 +495,7 @@ def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
 
 
 def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Yield the generalized weld of a card."""
+    """Yield the generalized weld on a card."""
     for row in _get_first_line(card):
         members = card.integer(row, GENERALIZED_WELD["NSID"])
         yield Constraint(
@@ -522,7 +522,7 @@ def _read_node_list(
     return Constraint(kind, nodes[0].field, number, ids)
 
 
-# Keyword of each kind of constraint, and the function that reads a card of this kind.
+# For each kind of constraint: its keyword, and the function that reads a card with this keyword.
 _CONSTRAINTS: Final[
     Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
 ] = {
@@ -536,7 +536,7 @@ _CONSTRAINTS: Final[
 
 
 class Entity(NamedTuple):
-    """A contact or rigid wall: keyword, id and title (0 and empty if missing), and its number in the deck."""
+    """A contact or rigid wall: keyword, id and title (0 and empty if missing), and its position in the deck."""
 
     keyword: str
     id: int
@@ -556,7 +556,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id, or else that with this number in order of definition.
+        """Return the contact or wall with this id, or else the one with this number in the order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # Function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
+    # A function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
     Forces = Callable[[str, int, float], Spans | None]
 
 
@@ -171,7 +171,7 @@ def _find_spans_of_switch(
 def _find_spans_of_sensor(
     deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
 ) -> Spans | str:
-    """Return the spans in which the force of a sensor is above (or below) a value, or why they are unknown."""
+    """Return the spans in which the force on a sensor is above (or below) a value, or why they are unknown."""
     card, row = _find_row(
         deck.named("SENSOR_DEFINE"), SENSOR_FORCE["SENSID"], number
     ) or (None, None)
@@ -198,7 +198,7 @@ def _find_spans_of_sensor(
 def _find_row(
     cards: Sequence[Card], column: CardColumn, number: int
 ) -> tuple[Card, Row] | None:
-    """Return the line that has this id in a column, with the id offset of its include file, and its card."""
+    """Return the line that contains this id in a column, with the id offset of its include file, and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )

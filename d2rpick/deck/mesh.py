@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _WIDEST: Final = 240  # Number of characters of the longest line of a mesh.
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-# Characters that show that a line has no fixed columns, so that it is parsed separately.
+# Characters that occur only in lines without fixed columns, which must be parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
 # Index of the last character of most ids; a line with a character at this index is not blank.
 _ID_ENDS: Final = 7
@@ -42,7 +42,7 @@ _HIGHEST: Final = 10**17  # Upper limit of ids; larger numbers would overflow.
 NO_NODE: Final = -1  # Index of a missing node.
 _DENSE: Final = 50_000_000  # Largest id for which a table of all ids fits into memory.
 NOTHING: Final = -1  # Placeholder for a field that contains no id.
-# Up to this number of lines, all fields are parsed together, because a deck may have a card for each element.
+# Largest number of lines whose fields are all parsed together, because a deck may have a card for each element.
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
@@ -50,7 +50,7 @@ NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 class Lines:
-    """The data lines in a piece of a mesh; comments and blank lines are left out.
+    """The data lines in a block of mesh lines, without comments and blank lines.
 
     ``in_columns``: all lines have fixed columns.
     """
@@ -113,7 +113,7 @@ class Lines:
 
     @cached_property
     def _texts(self) -> dict[int, str]:
-        """Return the lines that have no fixed columns, or that contain parameters, by their row."""
+        """Return the lines that have no fixed columns or that contain parameters, keyed by row."""
         if self.in_columns:
             return {}
         special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(
@@ -145,14 +145,14 @@ class Lines:
 
 
 def read_lines(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
-    """Yield the data lines of a card, piece by piece."""
+    """Yield the data lines of a card, block by block."""
     for data in _read_pieces(card.block):
         if data:
             yield Lines(data, card.scope, comments)
 
 
 def _read_pieces(block: Block) -> Iterator[bytes]:
-    """Yield the bytes below the keyword line in pieces that end with a line end."""
+    """Yield the bytes below the keyword line in blocks that end with a line end."""
     pieces = block.source.pieces(block.start, block.end)
     yield next(pieces).partition(b"\n")[2]
     yield from pieces
@@ -174,7 +174,7 @@ def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _parse_integers(field: NDArray[np.uint8]) -> Integers:
-    """Parse a field of digits: a blank gives 0, other text gives `NOTHING`."""
+    """Parse a field of digits: 0 for a blank, `NOTHING` for other text."""
     value = np.zeros(len(field), np.int64)
     is_valid = np.ones(len(field), bool)
     groups = np.zeros(len(field), np.uint8)
@@ -190,18 +190,18 @@ def _parse_integers(field: NDArray[np.uint8]) -> Integers:
 
 
 def _parse_reals(field: NDArray[np.uint8]) -> Reals:
-    """Parse a field of real numbers: a blank gives 0, other text gives NaN."""
+    """Parse a field of real numbers: 0 for a blank, NaN for other text."""
     blank = (field == _BLANK).all(axis=1)
     texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
     texts = np.where(blank, b"0", texts)
     try:
         return texts.astype(np.float64)
-    except ValueError:  # Solvers also read numbers like 1.5-3.
+    except ValueError:  # Solvers also accept numbers such as 1.5-3.
         return np.array([parse_real(text.decode("latin-1")) for text in texts.tolist()])
 
 
 def _make_id(value: float) -> int:
-    """Return a value as an id, or `NOTHING` if it is no valid id."""
+    """Return a value as an id; `NOTHING` if it is no valid id."""
     return int(value) if value >= 0 and value == int(value) else NOTHING
 
 
@@ -215,7 +215,7 @@ def find_distinct(values: Places) -> Places:
 
 
 def _find_used_ids(wanted: Sequence[Places]) -> Places:
-    """Return the ids of the nodes of elements, ascending."""
+    """Return the ids of the nodes of elements, in ascending order."""
     highest = max((int(node_ids.max(initial=0)) for node_ids in wanted), default=0)
     if highest > _DENSE:
         used = find_distinct(
@@ -230,7 +230,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 
 
 class NodeTable:
-    """The nodes of a mesh by index: first nodes with coordinates, then nodes that occur only in elements.
+    """The nodes of a mesh by index: first the nodes with coordinates, then nodes that occur only in elements.
 
     ``ids`` are the node ids by place, shape (nodes,).
 
@@ -259,7 +259,7 @@ class NodeTable:
         return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
 
     def known(self, ids: Places) -> Places:
-        """Return the indices of the nodes that are in the table."""
+        """Return the indices of those nodes that are in the table."""
         places_or_none = self.places(ids)
         return np.asarray(places_or_none[places_or_none != NO_NODE])
 
@@ -280,7 +280,7 @@ class Elements(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """Elements of a deck by kind, with their node table and its coordinates.
+    """Elements of a deck by kind, with their node table and the coordinates of the nodes.
 
     ``lost`` is the number of nodes of elements that have no coordinates.
     """
@@ -327,7 +327,7 @@ class Mesh(NamedTuple):
 
     @property
     def kinds(self) -> Mapping[int, set[str]]:
-        """Return the kinds of elements of each part."""
+        """Return the kinds of elements of each part, keyed by part id."""
         kinds_by_part: dict[int, set[str]] = {}
         for elements in self.elements:
             for part in np.unique(elements.part).tolist():
@@ -335,7 +335,7 @@ class Mesh(NamedTuple):
         return kinds_by_part
 
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
-        """Yield notes on elements of undefined parts and on nodes that have no coordinates.
+        """Yield notes on elements of undefined parts and on nodes without coordinates.
 
         ``sign`` begins the keywords.
         """
@@ -405,7 +405,7 @@ def find_parts_with_elements(starter: Starter) -> set[int]:
 def find_parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Return, for each group of nodes and parts, the parts whose nodes all belong to the group."""
+    """Return the parts whose nodes all belong to a group of nodes and parts, keyed by group."""
     elements = [*_read_element_blocks(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():
@@ -422,7 +422,7 @@ def find_parts_within(
 
 
 def _read_element_blocks(starter: Starter) -> Iterator[tuple[int, Integers]]:
-    """Yield part ids and node ids of elements, block by block. If the lines cannot be read, the node id is 0."""
+    """Yield part ids and node ids of elements, block by block; the node id is 0 if the lines cannot be read."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:

@@ -54,7 +54,7 @@ class Hold(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Gravity along a global ``axis`` (or None if the axis is local), with the constant ``values`` of its load curve.
+    """Gravity along a global ``axis`` (None for a local axis), with the ``values`` at which its load curve is constant.
 
     ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
     nodes.
@@ -67,7 +67,7 @@ class Gravity(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A weld, tie or rigid body (``kind`` is its name) with its nodes (ids or indices) and its parts."""
+    """A weld, tie or rigid body (named by ``kind``) with its nodes (ids or indices) and its parts."""
 
     kind: str
     nodes: Places
@@ -75,7 +75,7 @@ class Joint(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Joints between known parts (``found``), and names of the ties whose parts are unknown.
+    """Joints between known parts (``found``), and the names of ties whose parts are unknown.
 
     ``switched`` are rigid bodies that exist to be switched.
     """
@@ -125,7 +125,7 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Replace node ids with indices in the table; nodes that are not in the table are dropped."""
+    """Replace node ids with indices in the table; drop nodes that are not in the table."""
     # The nodes of a joint are never None, which mypy cannot infer for this type.
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
@@ -139,7 +139,7 @@ def make_ids(numbers: Iterable[int]) -> Places:
 
 
 def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
-    """Return the values at which a function is constant between two points, multiplied by ``scale``.
+    """Return the values that a curve keeps between two successive points, multiplied by ``scale``.
 
     Empty if it is never constant.
 
@@ -160,7 +160,7 @@ def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]
 
 
 class Formulation(NamedTuple):
-    """Formulation of the elements of a part: its name, and the class that determines their cost.
+    """Formulation of the elements of a part: its name, and the class that determines the element cost.
 
     ``cost`` is a key of the weights, or None if it is unknown. ``measured``: the weight was measured for this
     formulation, not for a similar one. ``in_plane`` is the number of integration points in each layer of a shell.
@@ -210,7 +210,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """Data of one part, except its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
+    """Data of one part without its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
 
     id: int
     title: str
@@ -228,7 +228,8 @@ class Inventory:
     coordinates : array
         Shape (nodes, 3), NaN for a node without coordinates [length].
     notes : tuple of str
-        Cards that cannot be read; ``complete`` is False if elements or parts may be missing because of them.
+        Cards that cannot be read, and a card that already switches parts; ``complete`` is False if elements or parts
+        may be missing.
     joints, switched : tuple of Joint
         Connections of parts that share no nodes, and rigid bodies that exist to be switched.
     ties : tuple of str
@@ -272,7 +273,7 @@ class Inventory:
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
-        """Return the number of elements by part and kind."""
+        """Return the number of elements of each kind in each part, keyed by part id."""
         counts: dict[int, Counter[str]] = {}
         for elements in self.elements:
             _count_elements(elements.kind, elements.part, counts)
@@ -298,7 +299,7 @@ class Inventory:
 
     @cached_property
     def nodes_by_part(self) -> Mapping[int, Places]:
-        """Return the ascending node indices of every part."""
+        """Return the ascending node indices of each part, keyed by part id."""
         pieces_by_part: dict[int, list[Places]] = {}
         for elements in self.elements:
             order = np.argsort(elements.part, kind="stable")
@@ -317,7 +318,7 @@ class Inventory:
 
     @cached_property
     def neighbours(self) -> Mapping[int, frozenset[int]]:
-        """Return for each part the parts that share nodes with it."""
+        """Return the parts that share nodes with each part, keyed by part id."""
         owner_count = np.zeros(len(self.coordinates), np.int32)
         for nodes in self.nodes_by_part.values():
             owner_count[nodes] += 1
@@ -338,7 +339,7 @@ class Inventory:
 
     @cached_property
     def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return, for each part, the parts that joints connect to it, with the kinds of these joints."""
+        """Return the parts that joints connect to each part, with the kinds of these joints, keyed by part id."""
         incomplete_bodies = (
             body
             for body, whole in zip(self.switched, self.ready, strict=True)
@@ -348,7 +349,7 @@ class Inventory:
 
     @cached_property
     def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return for each part the parts connected to it by springs, which can move relative to it."""
+        """Return the parts connected to each part by springs, which let them move relative to it, keyed by part id."""
         ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
         return self._held_by(
             [
@@ -361,7 +362,7 @@ class Inventory:
     def _held_by(
         self, joints: Sequence[Joint]
     ) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return, for each part, the parts that these joints connect to it, with the kinds of the joints."""
+        """Return the parts that the given joints connect to each part, with the kinds of joints, keyed by part id."""
         wanted = np.zeros(len(self.coordinates), bool)
         for _, nodes, _ in joints:
             wanted[nodes] = True
@@ -387,7 +388,7 @@ class Inventory:
 
     @cached_property
     def ready(self) -> tuple[frozenset[int], ...]:
-        """Return, for each rigid body in ``switched``, the parts that belong to it completely, except springs."""
+        """Return, for each rigid body in ``switched``, the parts that belong to it completely, without springs."""
         whole_parts = []
         for _, nodes, parts in self.switched:
             mask = self._mask(parts)
@@ -424,7 +425,7 @@ class Inventory:
         )
 
     def _within(self, body: Collection[int], springs: Collection[int]) -> list[int]:
-        """Return the parts of springs whose nodes all belong to a body."""
+        """Return the spring parts whose nodes all belong to a body."""
         mask = self._mask(body if springs else ())
         return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
@@ -452,7 +453,7 @@ class Inventory:
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Count, by part and kind, the elements that are rigid once these parts are rigid bodies.
+        """Return the numbers of elements that are rigid once these parts are rigid bodies, keyed by part id and kind.
 
         Radioss deactivates every element whose nodes all lie in a body, LS-DYNA the elements of the switched parts.
         """
@@ -465,8 +466,8 @@ class Inventory:
         return counts_by_part
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Count, by part and kind, the elements whose nodes all belong to these parts."""
-        # The index NO_NODE is -1 and selects this last entry.
+        """Return the numbers of elements whose nodes all belong to these parts, keyed by part id and kind."""
+        # The index NO_NODE is -1, and therefore selects this last entry.
         inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}
         for elements in self.elements:
@@ -478,7 +479,7 @@ class Inventory:
         return counts_by_part
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
-        """Return an array (nodes,) that is True for the nodes of given parts."""
+        """Return a mask (nodes,) of the nodes of given parts."""
         mask = np.zeros(len(self.coordinates), bool)
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True

@@ -1,4 +1,4 @@
-"""Write part sets: a card with too many parts to list names a *SET_PART_LIST."""
+"""Write part sets: a card refers to a *SET_PART_LIST if it has too many parts to list."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from d2rpick.deck.ls_dyna_columns import SET, SET_PART_LIST
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-# Ids of the part sets by their parts in ascending order.
+# Part set ids, keyed by the sorted tuple of part ids.
 PartSets = Mapping[tuple[int, ...], int]
 NO_SETS: Final[PartSets] = {}
-# Largest number of parts that a card lists; for more parts, the card names a part set.
+# Largest number of parts that a card lists; for more parts, the card refers to a part set.
 _MOST_LISTED: Final = 10
 
 
 def number_sets(
     groups: Iterable[Sequence[int]], first: int
 ) -> dict[tuple[int, ...], int]:
-    """Return the ids of the part sets for all groups with too many parts to list them."""
+    """Return part set ids for all groups with too many parts to list, keyed by the sorted tuple of part ids."""
     long_groups = dict.fromkeys(
         tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED
     )
@@ -29,7 +29,7 @@ def number_sets(
 
 
 def name_parts(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
-    """Return ids and kinds (PTYPE) by which a card names the parts: their part set, if there is one, or each part."""
+    """Return the ids and kinds (PTYPE) by which a card refers to parts: their part set, if any, or each part."""
     number = part_sets.get(tuple(sorted(parts)))
     return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Cached piece numbers of the nodes of each deck, because a mesh may have millions of nodes.
+# Cached numbers of the connected piece of each node; they are cached because a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
@@ -43,16 +43,16 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# A node lies on a plane if its distance is below this share of the size of the piece [-].
+# Largest distance of a node on a plane from the plane, as a fraction of the size of the connected piece [-].
 _FLAT: Final = 1e-6
-# A piece moves other pieces on springs only if it has at least this share of the mass of all these pieces [-].
+# Smallest mass of a piece that moves other pieces on springs, as a fraction of the mass of all these pieces [-].
 _HEAVY: Final = 0.05
 
 
 def count_pieces(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
 ) -> int:
-    """Return the number of disconnected pieces of given parts; 0 if there are no elements.
+    """Return the number of disconnected pieces of the mesh of given parts; 0 if there are no elements.
 
     ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
     """
@@ -64,7 +64,7 @@ def count_pieces(
 def label_pieces(
     inventory: Inventory, parts: frozenset[int], *, springs: bool = True
 ) -> Places:
-    """Return the number of the piece to which each node of the deck belongs, shape (nodes,); the result is cached.
+    """Return the number of the connected piece to which each node of the deck belongs, shape (nodes,); cached.
 
     Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
     """
@@ -79,7 +79,7 @@ def label_pieces(
 def _compute_labels(
     inventory: Inventory, parts: frozenset[int], *, springs: bool
 ) -> Places:
-    """Compute the piece of each node."""
+    """Compute the number of the connected piece to which each node belongs."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -101,7 +101,7 @@ def _compute_labels(
 def _list_connections(
     inventory: Inventory, parts: frozenset[int], *, springs: bool
 ) -> Iterator[Places]:
-    """Yield arrays in which the nodes of each row are connected."""
+    """Yield arrays of nodes; the nodes in each row are connected."""
     wanted = np.array([*parts], np.int64)
     part_nodes = inventory.nodes_by_part
     for elements in inventory.elements:
@@ -118,7 +118,7 @@ def _list_connections(
 def find_supports(
     inventory: Inventory,
 ) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
-    """Return the supports of each supported part, and the supports of the model.
+    """Return the supports of each supported part, keyed by part id, and the supports of the model.
 
     A completely fixed piece is an obstacle: it is supported itself, but does not support a piece that it is not
     connected to.
@@ -170,7 +170,7 @@ def find_supports(
 def _find_held_pieces(
     inventory: Inventory, labels: Places, held: Places
 ) -> Iterator[tuple[int, Places]]:
-    """Yield each piece with supported nodes, and the nodes of its elements."""
+    """Yield each connected piece with supported nodes, and the nodes of its elements."""
     used = np.unique(
         np.concatenate([np.empty(0, np.int64), *inventory.nodes_by_part.values()])
     )
@@ -183,15 +183,15 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds nodes of a piece. Fixed rotations count only if the translations are free."""
+    """Return True if a support holds nodes of a piece. Fixed rotations are ignored unless the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
 
 
 def _find_rotating_nodes(inventory: Inventory) -> Mask:
-    """Return an array that is True for nodes that have rotational degrees of freedom."""
-    # The index NO_NODE is -1 and selects this last entry.
+    """Return a mask of the nodes that have rotational degrees of freedom."""
+    # The index NO_NODE is -1, and therefore selects this last entry.
     has_rotations = np.zeros(len(inventory.coordinates) + 1, bool)
     for elements in inventory.elements:
         if elements.kind not in _UNTURNED:
@@ -230,24 +230,24 @@ def _find_symmetry_axes(
 
 
 def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bool:
-    """Return True if the fixed nodes are all nodes on a plane that bounds the piece."""
+    """Return True if the fixed nodes are all nodes on a plane that bounds the connected piece."""
     plane = heights[fixed][0]
     on_plane = np.abs(heights - plane) <= tolerance
     one_side = heights.min() >= plane - tolerance or heights.max() <= plane + tolerance
     return bool(one_side and (on_plane == fixed).all())
 
 
-# The code below computes the longest period of pieces that oscillate on springs.
-# A piece has no springs inside and has mass m; its springs connect it to pieces of total mass M.
-# The reduced mass of such a piece is mu = m M/(m + M).
+# The code below computes the longest period of connected pieces that oscillate on springs.
+# A piece without inner springs has the mass m; its springs connect it to pieces of total mass M.
+# The reduced mass of a piece of mass m that springs connect to pieces of total mass M is mu = m M/(m + M).
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K of the piece.
 # The period of a piece along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
-# A load is transmitted first in the stiffest direction, so the period uses the largest lambda.
-# If the trace of K replaces lambda, the formula for the period gives a lower limit of all periods.
+# A load is transmitted first in the stiffest direction, so the largest eigenvalue of K determines the period.
+# Replacing the eigenvalue by the trace of K in the formula for the period gives a lower limit of all periods.
 
 
 class InnerPeriod(NamedTuple):
-    """The longest period [time], its lower limit ``least`` [time], and a string that says what oscillates."""
+    """The longest period [time], its lower limit ``least`` [time], and a description of what oscillates."""
 
     time: float
     least: float
@@ -255,7 +255,7 @@ class InnerPeriod(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A piece of the mesh that elements other than springs connect: its parts and its mass."""
+    """A piece of the mesh that is connected by elements other than springs: its parts and its mass."""
 
     parts: frozenset[int]
     mass: float
@@ -308,7 +308,7 @@ def find_inner_period(inventory: Inventory) -> InnerPeriod | None:
 def _weigh_pieces(
     inventory: Inventory, parts: Collection[int], labels: Places
 ) -> Mapping[int, _Piece] | None:
-    """Return the pieces by their numbers; None if the mass of a part is unknown."""
+    """Return the connected pieces, keyed by number; None if the mass of a part is unknown."""
     masses = compute_masses_and_steps(inventory)
     pieces_by_label = dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
@@ -343,7 +343,7 @@ def _weigh_pieces(
 def _find_springs(
     inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]
 ) -> Iterator[_Spring | None]:
-    """Yield the springs between two pieces; None stands for a spring of unknown stiffness."""
+    """Yield the springs between two pieces, with None for a spring of unknown stiffness."""
     springs = (elements for elements in inventory.elements if elements.kind == SPRING)
     for elements in springs:
         for part, ends in zip(
@@ -373,7 +373,7 @@ def _find_springs(
 def _compute_period(
     label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]
 ) -> InnerPeriod:
-    """Return the period in which a piece oscillates relative to the pieces on the other ends of its springs."""
+    """Return the period in which a piece oscillates relative to the pieces at the other ends of its springs."""
     piece = pieces[label]
     joined = frozenset[int]().union(*(spring.joins for spring in springs))
     mass_of_others = sum(pieces[other].mass for other in joined - {label})

@@ -154,7 +154,7 @@ def write_number(value: float, width: int = LONGEST) -> str:
         raise DeckError(
             f"{value:g} cannot be written in {width} columns; give a number that fits"
         )
-    # An exact text is preferred, then digits on both sides of the point, then a short text.
+    # An exact text is preferred, then a text with digits on both sides of the point, then a short text.
     return min(
         fitting,
         key=lambda text: (

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# For each kind: the CODE that waits for the end of a force, and the CODE that waits for a force.
+# CODE values that wait for the end of a force, and for a force, keyed by kind of contact.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -325,7 +325,7 @@ def _print_radioss_contact(
 
 
 def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
-    """Return kind, id and contact times of the contact or wall that switches the bodies.
+    """Return kind, id and contact times of the contact or wall whose force switches the bodies.
 
     Raises
     ------
@@ -524,7 +524,7 @@ def print_cards(
     printing: Printing,
     remarks: Sequence[str] = (),
 ) -> PrintedCard:
-    """Print the card of rigid windows.
+    """Print the card for rigid windows.
 
     Parameters
     ----------

@@ -50,9 +50,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.radioss_rigid import Body
 
-# Value of Ikrem with which the starter keeps the nodes of a body in rigid walls.
+# Value of Ikrem for which the starter keeps the nodes of a body in rigid walls.
 _STAYS: Final = 1
-# Column of the node group in the first line below the title, by keyword of the initial velocity.
+# Column of the node group in the first line below the title, keyed by keyword of the initial velocity.
 _GROUP_OF_VELOCITY: Final = dict.fromkeys(
     ("TRA", "ROT", "T+G", "GRID"), VELOCITY["grnod_ID"]
 ) | {"AXIS": AXIS_GROUP["grnod_ID"]}
@@ -60,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """The rigid bodies that switch given parts, and the cards of new bodies among them.
+    """The rigid bodies that switch given parts, and the cards of the new bodies among them.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -156,12 +156,12 @@ def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Return True if a body is never rigid; ``unused`` are main nodes of bodies that no engine run activates."""
+    """Return True if a body is never rigid; ``unused`` contains main nodes of bodies that no engine run activates."""
     return body.node.value in unused and not body.sensor
 
 
 def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
-    """Return a remark if the body of these parts joins pieces that have no other connection."""
+    """Return a remark if the body of these parts joins mesh pieces that have no other connection."""
     pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
@@ -222,7 +222,7 @@ def _find_ready_bodies(
     groups: NodeGroups,
     unused: Collection[int],
 ) -> tuple[int, ...]:
-    """Return the main nodes of the bodies in the deck that contain exactly a group of parts.
+    """Return the main nodes of those bodies in the deck that contain exactly a group of parts.
 
     Empty if no body contains any of their nodes, or only bodies that are never rigid, which a new one replaces.
     """
@@ -280,7 +280,7 @@ def _has_nodes(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
 
 
 class _BodyWriter:
-    """Writes new bodies whose ids no card of the deck uses."""
+    """Writes new bodies with ids that no card of the deck uses."""
 
     def __init__(
         self, starter: Starter, inventory: Inventory, groups: NodeGroups
@@ -294,7 +294,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return the main node of a new rigid body of given parts, and the body's cards with velocity and gravity."""
+        """Return the main node of a new rigid body of given parts, and its cards with velocity and gravity."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")
@@ -336,7 +336,7 @@ class _BodyWriter:
         return self._free[kind]
 
     def _centre(self, parts: Sequence[int]) -> Reals:
-        """Return the centre of mass of some nodes (3,) [length]; if a mass is unknown, return their mean position.
+        """Return the centre of mass (3,) of the nodes of parts [length], or their mean position if a mass is unknown.
 
         The starter corrects it.
         """

@@ -34,7 +34,7 @@ RIGID_PART: Final = DataLine(integers("node_ID"), blank(40), integers("sens_ID")
 
 MERGE: Final = DataLine(integers("main_ID M_type secon_ID S_type"))
 NODE: Final = DataLine(integers("node_ID"), reals("X Y Z", _REAL))
-# Line of ids of /GRNOD, /SUBSET and /SURF/PART; it also fits the first id of /TH/NODE and /INIVEL/NODE.
+# Line of ids of /GRNOD, /SUBSET and /SURF/PART, which also fits the first id of /TH/NODE and /INIVEL/NODE.
 ID_LIST: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8 ID9 ID10"))
 
 # Lines of /RWALL: the line below the title, the distance, and points.
@@ -99,6 +99,6 @@ RUN: Final = DataLine(reals("Tstop", _REAL))
 
 
 def make_radioss_element_line(id_count: int) -> DataLine:
-    """Return the column layout of an element line with this number of ids."""
+    """Return a data line of elements with ``id_count`` ids."""
     names = " ".join(f"ID{number}" for number in range(1, id_count + 1))
     return DataLine(integers(names))

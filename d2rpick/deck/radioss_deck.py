@@ -50,9 +50,9 @@ WITHOUT_FRAME: Final = {
     "BRIC20",
     "SHEL16",
 }
-_RIGID_PARTS_SINCE: Final = 2612  # First input version in which /PART has Irigid.
+_RIGID_PARTS_SINCE: Final = 2612  # First input version with Irigid in /PART.
 _ICOROTATIONAL: Final = 2  # Value of Iframe that selects a co-rotational frame.
-# Values of Isolid of bricks that have no co-rotational frame (12 according to the help up to 2017).
+# Values of Isolid of bricks without a co-rotational frame (12 according to the help up to 2017).
 _NOT_TURNED: Final = {
     1,
     2,
@@ -76,7 +76,7 @@ def read_blocks(source: SourceFile) -> Iterator[Block]:
 
 
 def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
-    """Yield the offset and text of the lines that begin with ``/`` or ``#include``.
+    """Yield offset and text of the lines that begin with ``/`` or ``#include``.
 
     Lines of a mesh are not looked at one by one.
     """
@@ -87,7 +87,7 @@ def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
-    """Return offset and text of the lines in this piece that begin with ``/`` or ``#include``."""
+    """Return offset and text of the lines in this block of text that begin with ``/`` or ``#include``."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
@@ -115,7 +115,7 @@ def split_keyword(block: Block) -> tuple[str, ...]:
 
 
 def parse_id(text: str) -> int:
-    """Read an id from a keyword line or a field of 10 columns; other text gives 0."""
+    """Read an id from a keyword line or a field of 10 columns; 0 for other text."""
     text = text.strip()
     return int(text) if text.isdecimal() and len(text) <= _DIGITS else 0
 
@@ -151,7 +151,7 @@ class RadiossLeg:
     name: str
     number: int
     stop: Value[float]
-    # For each switching card: True if it makes bodies rigid, and its main nodes.
+    # Switching cards, each with True if it makes bodies rigid, and with the main nodes of these bodies.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
     )
@@ -160,7 +160,7 @@ class RadiossLeg:
     starts: list[InitialVelocity] = field(default_factory=list)
     # Ids of the sensors that are reset at the start of the engine run.
     resets: list[int] = field(default_factory=list)
-    sensor: int = 0  # Id of a sensor that ends the engine run at an unknown time.
+    sensor: int = 0  # Id of a sensor that ends the engine run at an unknown time, or 0.
 
 
 def read_legs(source: SourceFile) -> list[RadiossLeg]:
@@ -195,7 +195,7 @@ def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
 
 
 def _begin_leg(card: Card) -> RadiossLeg:
-    """Begin an engine run with its /RUN card."""
+    """Begin an engine run at its /RUN card."""
     missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
     return RadiossLeg(
@@ -247,7 +247,7 @@ def _read_start(card: Card) -> InitialVelocity:
 
 
 def read_numbers(card: Card) -> Iterator[Value[float]]:
-    """Yield all numbers below a keyword, in free format."""
+    """Yield all numbers below a keyword, which are in free format."""
     for distance, line in card.block.lines():
         column = 0
         for word in line.split():
@@ -289,7 +289,7 @@ class Starter:
         return [make_card(block) for block in self.blocks]
 
     def named(self, *keywords: str) -> list[Card]:
-        """Return the cards whose keyword begins with one of these words."""
+        """Return the cards whose keyword begins with one of the given words."""
         return [card for card in self.cards if card.words[0] in keywords]
 
     @cached_property
@@ -301,7 +301,7 @@ class Starter:
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Return the rigid bodies; each includes all bodies that are merged into it.
+        """Return the rigid bodies, each with all bodies that are merged into it.
 
         A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
@@ -309,12 +309,12 @@ class Starter:
 
     @cached_property
     def rigid(self) -> RigidBodies:
-        """Return the rigid bodies as the engine uses them."""
+        """Return the rigid bodies in the form that the engine uses."""
         written = [*self._written_bodies(), *self._bodies_of_parts()]
         return make_rigid_bodies(written, [*self._merges()], self._last_node)
 
     def _written_bodies(self) -> Iterator[Body]:
-        """Yield the bodies of /RBODY."""
+        """Yield the bodies that /RBODY defines."""
         for card in self.named("RBODY"):
             for row in get_lines_below_title(card)[: get_number(card) > 0]:
                 node, sensor, group, keeps = (
@@ -371,7 +371,7 @@ class Starter:
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
-        """Return the /PART lines by part id."""
+        """Return the /PART lines, keyed by part id."""
         return {
             get_number(card): PartLine(
                 card.rows[0].text.strip(),
@@ -394,7 +394,7 @@ class Starter:
 
     @cached_property
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
-        """Return, for each node group, the kind of its members (NODE, PART, SUBSET or GRNOD) and their ids."""
+        """Return the kind of the members (NODE, PART, SUBSET or GRNOD) and their ids, keyed by node group."""
         group_cards = (card for card in self.named("GRNOD") if card.words[1:])
         written = {
             get_number(card, 2): (card.words[1], _read_ids(get_lines_below_title(card)))
@@ -407,7 +407,7 @@ class Starter:
 
     @cached_property
     def sensors(self) -> Mapping[int, Card]:
-        """Return the sensor cards by id."""
+        """Return the sensor cards, keyed by sensor id."""
         return {
             get_number(card, 2): card for card in self.named("SENSOR") if card.words[1:]
         }
@@ -425,13 +425,13 @@ class Starter:
 
     @property
     def unturned(self) -> dict[int, str]:
-        """Return, by part, the element kind of solids whose stresses do not rotate with a rigid body."""
+        """Return the element kind of solids whose stresses do not rotate with a rigid body, keyed by part id."""
         defaults = [
             _read_isolid_and_iframe(card, card.rows[0])
             for card in self.named("DEF_SOLID")
             if card.rows
         ]
-        # If several cards define a property, the solver uses the first card.
+        # If several cards define the default flags of solids, the solver uses the first card.
         isolid, iframe = defaults[0] if defaults else (0, 0)
         solids = (
             card
@@ -488,7 +488,7 @@ class Starter:
         return nodes, parts
 
     def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
-        """Yield the nodes of the deck that lie in ranges, given by pairs of first and last node."""
+        """Yield the nodes of the deck that lie in ranges, given as pairs of first and last node."""
         ranges = [
             range(first, last + 1)
             for first, last in zip(ends[::2], ends[1::2], strict=False)
@@ -508,7 +508,7 @@ class Starter:
         return self.groups.get(group, ("", ()))
 
     def _groups_in(self, group: int) -> tuple[int, ...]:
-        """Return the ids of the node groups in a group."""
+        """Return the ids of the node groups contained in a group."""
         kind, ids = self._group(group)
         return ids if kind == "GRNOD" else ()
 
@@ -521,11 +521,11 @@ def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Return the ids on lines with fields of 10 columns; a string that is not an id gives -1."""
+    """Return the ids on lines with fields of 10 columns; -1 for a string that is not an id."""
     cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 
 
 def read_reals(row: Row, columns: Iterable[CardColumn]) -> list[float]:
-    """Read the numbers in the columns of a line: a blank gives 0, text that is not a number gives NaN."""
+    """Read the numbers in the columns of a line: 0 for a blank, NaN for text that is not a number."""
     return [parse_real(column.cut(row.text)) for column in columns]

@@ -72,7 +72,7 @@ def list_run_files(path: str) -> list[str]:
         folder = Path(path).parent
         file_names = sorted(os.listdir(folder))  # noqa: PTH208  pathlib is slow for many runs
     except (OSError, ValueError):
-        return []  # The reader of the file reports this error.
+        return []  # The error is reported by the reader of the file.
     name = _find_run_name(path, head)
     numbered = (
         re.fullmatch(_NUMBERED, file_name)
@@ -87,7 +87,7 @@ def list_run_files(path: str) -> list[str]:
 
 
 def find_root(path: str) -> str:
-    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``, else empty.
+    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``; otherwise empty.
 
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import RadiossRun
 
-_PENALTY_SINCE: Final = 2026  # First input version in which a rigid wall has Iform.
+_PENALTY_SINCE: Final = 2026  # First input version with Iform in a rigid wall.
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
 # Words that may precede the geometry in the keyword of a rigid wall.
 _WITH_KIND: Final = {"LAGMUL", "THERM"}
@@ -66,7 +66,7 @@ class NodeGroups:
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
-        """Return the node ids by part; parts with particles are left out, because particles are not read."""
+        """Return the node ids, keyed by part id; parts with particles are omitted, because particles are not read."""
         nodes_by_part: dict[int, list[Integers]] = {
             part: [np.empty(0, np.int64)] for part in self._starter.parts
         }
@@ -98,7 +98,7 @@ class NodeGroups:
 
 
 def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
-    """Return the flaws of a run in which the rigid bodies with these main nodes are switched, or kept off.
+    """Return the flaws of a run in which the rigid bodies with these main nodes are switched or kept inactive.
 
     A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
     """
@@ -124,14 +124,14 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
         for flaw in _check_wall(wall, starter, groups, bodies)
     ]
     flaws += [*_check_starts(run, groups, bodies)]
-    # If an include file was not read, it may contain a velocity.
+    # An include file that was not read may contain a velocity.
     if not run.deck.unread:
         flaws += _check_velocities(run, starter, groups, bodies)
     return tuple(dict.fromkeys(flaws))
 
 
 def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
-    """Return a flaw that reports that the nodes of a group are unknown."""
+    """Return a flaw which reports that the nodes of a group are unknown."""
     message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
     return Flaw(NOT_FOLLOWED, field, message)
 
@@ -152,7 +152,7 @@ def _get_body_nodes(body: Body, groups: NodeGroups) -> frozenset[int]:
 def _check_wall(
     card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield the flaws of a rigid wall: bodies whose nodes the starter removes from it.
+    """Yield the flaws of a rigid wall: bodies whose nodes the starter removes from the wall.
 
     Ikrem 1 keeps the nodes of a body in the wall; OpenRadioss applies the Ikrem of the /RBODY with the highest id to
     all.
@@ -223,7 +223,7 @@ def _find_nodes_near_wall(
 def _compute_distance(
     kind: str, coordinates: Reals, points: Reals, radius: float
 ) -> Reals | None:
-    """Return the distance of nodes (n, 3) from the front of a wall; None if the geometry is incomplete."""
+    """Return the distance of nodes (n, 3) from the front of a wall [length]; None if the geometry is incomplete."""
     offsets = coordinates - points[0]
     if kind == "SPHER":
         return np.asarray(np.linalg.norm(offsets, axis=1) - radius)
@@ -316,7 +316,7 @@ def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
 def _check_starts(
     run: RadiossRun, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield the flaws of bodies that are on in an engine run whose /INIV moves their nodes but not their main node."""
+    """Yield the flaws of bodies active in an engine run whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
         for _, rigid, nodes in leg.switched:

@@ -1,4 +1,4 @@
-"""Read parts, elements, gravity, supports, prescribed motion and joints of a Radioss starter deck.
+"""Read parts, elements, gravity, supports, prescribed motions and joints from a Radioss starter deck.
 
 Columns: Altair's public help for the elements, properties and materials, /GRAV, /FUNCT, /BCS, /IMPVEL, /IMPDISP,
 /IMPACC and /INTER/TYPE2, and the solver's published source.
@@ -106,7 +106,7 @@ _AREA_LINE: Final = {
     "TYPE3": 2,
     "TRUSS": 0,
     "TYPE2": 0,
-}  # For each property type: number of the line below the title that contains the area.
+}  # Number of the line below the title that contains the area, keyed by property type.
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {
     "SPR_GENE",
@@ -132,7 +132,7 @@ _AXES: Final = "XYZ"
 
 
 class _Property(NamedTuple):
-    """A property as written: its type, formulation flags of shells, triangles and solids, and its section."""
+    """A property card: its type, the formulation flags of shells, triangles and solids, and its section."""
 
     type: str
     shell: int = 0
@@ -142,7 +142,7 @@ class _Property(NamedTuple):
 
 
 def read_radioss_inventory(run: RadiossRun) -> Inventory:
-    """Return the parts and elements of a run; if there is no starter deck, return a note only."""
+    """Return the parts and elements of a run; if there is no starter deck, return only a note."""
     starter = run.starter
     if starter is None:
         return Inventory(
@@ -207,7 +207,7 @@ def _find_watched_nodes(starter: Starter) -> Integers:
 
 
 def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:
-    """Yield notes on elements that may be missing."""
+    """Yield notes on elements that may be missing from the inventory."""
     yield from (
         f"{card.at}: elements of /{card.name} are not read"
         for card in starter.named(*NOT_COUNTED)
@@ -218,7 +218,7 @@ def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:
         if has_mesh(block)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in run.deck.unread
     )
     if starter.moved:
@@ -228,7 +228,7 @@ def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:
 def _collect_parts(
     starter: Starter, mesh: Mesh, rigid: set[int]
 ) -> Mapping[int, PartData]:
-    """Return the data of all parts by part id."""
+    """Return the data of all parts, keyed by part id."""
     materials = dict(_collect_materials(starter))
     properties = dict(_collect_properties(starter))
     kinds = mesh.kinds
@@ -266,7 +266,7 @@ def _choose_material(
 
 
 def _find_always_rigid(windows: Sequence[SwitchWindow]) -> set[int]:
-    """Return the parts that are rigid from the start to the end; empty if there is no engine file."""
+    """Return the parts that are rigid from the start to the end of the run; empty if there is no engine file."""
     return {
         window.unit.id
         for window in windows
@@ -343,7 +343,7 @@ def _read_section(type_: str, rows: Sequence[str]) -> Section:
 def _complete_section(
     prop: _Property | None, kinds: set[str], *, turns: bool
 ) -> Section:
-    """Return the section of a part with the formulations of its elements."""
+    """Return the section of a part, with the formulations of its elements."""
     if prop is None:
         return Section(turns=turns)
     formulations_by_kind: dict[str, Formulation] = {}
@@ -359,7 +359,7 @@ def _complete_section(
 
 
 def _read_spring_section(rows: Sequence[str]) -> Section:
-    """Read mass and stiffness of a spring; the stiffness is not constant if a function is given."""
+    """Read mass and stiffness of a spring; the stiffness is unknown if a function defines it."""
     linear = len(rows) < 3 or not SPRING_FUNCTION["fct_ID1"].cut(rows[2]).strip(" 0")
     return Section(
         damped=_read_positive(rows, 1, SPRING["C"]) is not None,
@@ -381,14 +381,14 @@ def _read_shell_section(rows: Sequence[str]) -> Section:
 
 
 def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
-    """Return the flags in the first line; a string that is not a flag gives 0."""
+    """Return the flags in the first line; 0 for a string that is not a flag."""
     return [
         card.integer(rows[0], column).value if rows else 0 for column in SOLID_FLAGS
     ]
 
 
 def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float | None:
-    """Read a positive number in a column; return None if the field contains anything else."""
+    """Read a positive number from a column; None if the field contains anything else."""
     value = parse_real(column.cut(rows[row])) if row < len(rows) else 0.0
     return value if value > 0 else None
 
@@ -413,7 +413,7 @@ def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
 
 
 def _name_card(card: Card) -> str:
-    """Return the keyword of a card with its file and line, for messages."""
+    """Return the keyword of a card with its file and line, for use in messages."""
     return f"/{card.name} ({card.at})"
 
 
@@ -461,7 +461,7 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
-    """Read a /BCS card. In local axes it is always treated as a support, unless it fixes all translations."""
+    """Read a /BCS card. In local axes, it is always treated as a support, unless it fixes all translations."""
     moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
@@ -473,7 +473,7 @@ def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
 
 
 def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
-    """Read a prescribed motion with its times; with a sensor or its own units it acts at all times."""
+    """Read a prescribed motion with its times; with a sensor or units of its own, it is assumed to act at all times."""
     timed = (
         len(rows) > 1
         and not card.integer(rows[0], GRAVITY["sens_ID"]).value
@@ -493,7 +493,7 @@ def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
 def _find_body_holds(
     run: RadiossRun, starter: Starter, holds: Sequence[model.Hold]
 ) -> Iterator[model.Hold]:
-    """Yield a support of all nodes of a rigid body that is active, for each support of its main node."""
+    """Yield a support of all nodes of an active rigid body for each support of its main node."""
     for body in starter.bodies:
         if body.sensor or body.node.value in run.named:
             members = None
@@ -582,7 +582,7 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
 
 # Joints connect parts that share no nodes: ties, and rigid bodies that are always active.
 # Joints must be inactive while a part is rigid, because a node cannot belong to two rigid bodies.
-# Altair's help on incompatible kinematic conditions is the source of this rule.
+# The source of the rule on joints is Altair's help on incompatible kinematic conditions.
 
 
 def _find_joints(run: RadiossRun, starter: Starter) -> model.Joints:

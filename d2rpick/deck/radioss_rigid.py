@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    # Kind of the members of a node group, and their ids.
+    # Kind of the members of a node group, and the ids of the members.
     Group = tuple[str, tuple[int, ...]]
 
 # Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
-# First id of the node groups that d2rpick adds, which is larger than any id of a deck.
+# First id of the node groups that d2rpick adds; it is larger than any id of a deck.
 MADE_HERE: Final = 10**10
 
 
@@ -43,7 +43,7 @@ class Body(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the name of the body for messages."""
+        """Return the name of the body for use in messages."""
         return f"/RBODY {self.id}" if self.id else f"the rigid body of part {self.part}"
 
 
@@ -57,7 +57,7 @@ class Merge(NamedTuple):
 
 
 class RigidBodies(NamedTuple):
-    """Rigid bodies by their main nodes, as the engine knows them.
+    """Rigid bodies in the form that the engine uses, keyed by main node.
 
     ``joined_to`` maps the main node of each merged body, which the engine does not know, to the body that contains it.
     ``groups`` are the node groups that contain merged bodies.
@@ -71,7 +71,7 @@ class RigidBodies(NamedTuple):
 def make_rigid_bodies(
     in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]
 ) -> RigidBodies:
-    """Return the rigid bodies of a deck as the engine uses them.
+    """Return the rigid bodies of a deck in the form that the engine uses.
 
     Parameters
     ----------

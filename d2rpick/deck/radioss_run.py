@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, repr=False)
 class RadiossRun:
-    """A Radioss run: its starter deck (if found) and its engine runs in the order of their numbers.
+    """A Radioss run: its starter deck (if found), and its engine runs in the order of their numbers.
 
     ``deck`` lists its files.
     """
@@ -65,12 +65,12 @@ class RadiossRun:
     deck: Deck
     starter: Starter | None = None
     legs: list[RadiossLeg] = field(default_factory=list)
-    # Include files by path, so that a file that is included twice is read once.
+    # Include files, keyed by path, so that a file that is included twice is read only once.
     included: dict[str, SourceFile] = field(default_factory=dict)
 
     @cached_property
     def named(self) -> frozenset[int]:
-        """Return the main nodes that the engine runs switch."""
+        """Return the main nodes of the bodies that the engine runs switch."""
         main_nodes: set[int] = set()
         for leg in self.legs:
             for _, _, nodes in leg.switched:
@@ -79,7 +79,7 @@ class RadiossRun:
 
     @cached_property
     def resets(self) -> Mapping[int, float]:
-        """Return the time of the first reset of each sensor (/SENS/RESET), at the start of an engine run [time]."""
+        """Return the time of the first reset (/SENS/RESET) at the start of an engine run [time], keyed by sensor id."""
         first_resets: dict[int, float] = {}
         start = 0.0
         for leg in self.legs:
@@ -114,8 +114,15 @@ def read_run(path: str, content: bytes | None = None) -> RadiossRun:
         source = SourceFile(name, content)
         head = source.read(0, HEAD)
         if not is_radioss(head):
+            is_ls_dyna = re.search(rb"(?im)^\*KEYWORD", head) is not None
+            found = (
+                "this is an LS-DYNA deck"
+                if is_ls_dyna
+                else "no /BEGIN or /RUN was found"
+            )
+            cure = "; for LS-DYNA see d2rpick first" if is_ls_dyna else ""
             raise DeckError(
-                f"{name}: no /BEGIN or /RUN was found, expected a file of a Radioss run"
+                f"{name}: {found}, a file of a Radioss run was expected{cure}"
             )
         run.deck.sources.append(source)
         if re.search(ENGINE, head):
@@ -153,7 +160,7 @@ def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -
 def _read_include(
     card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
 ) -> None:
-    """Add the file that an #include names, or record why the file was not read."""
+    """Add the file that an #include names, or record why it was not read."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     words = card.block.head.split(maxsplit=1)[1:]
@@ -173,7 +180,7 @@ def _read_include(
 
 @dataclass(eq=False, repr=False)
 class LegSwitch(SwitchSet):
-    """Bodies that an engine run switches when it begins, at time ``at``; ``stop_field`` contains that time."""
+    """Bodies that an engine run switches when it begins, at the time ``at``; ``stop_field`` contains this time."""
 
     at: float = 0.0
     stop_field: CardField | None = None
@@ -185,13 +192,13 @@ class LegSwitch(SwitchSet):
 
     @property
     def time_field(self) -> CardField:
-        """Return the field with the end of the previous engine run, or the keyword in the first engine run."""
+        """Return the field with the end of the previous engine run, or the keyword for the first engine run."""
         return self.stop_field or self.card.here
 
 
 @dataclass(eq=False, repr=False)
 class RunWindows:
-    """Rigid windows of a run, the cards that make them, and the parts of the bodies by main node, if known."""
+    """Rigid windows of a run, the cards that cause them, and the parts of the bodies (if known), keyed by main node."""
 
     windows: Windows
     sets: tuple[LegSwitch, ...]
@@ -199,7 +206,7 @@ class RunWindows:
 
 
 def is_in_order(legs: list[RadiossLeg]) -> bool:
-    """Return True if no engine run is missing from the first to the last, and each ends at a known time.
+    """Return True if the engine runs are numbered without gaps and each ends at a known time.
 
     No engine run may end before the previous one.
     """
@@ -287,7 +294,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of a unit of a body, which is rigid from the start unless it is deactivated at the start."""
+    """Return the windows of a part of a body, which is rigid from the start unless it is deactivated then."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (
@@ -335,7 +342,7 @@ def find_course(
 def _follow_sensor(
     run: RadiossRun, body: Body, parts: dict[int, set[int]], course: Course
 ) -> Iterator[SwitchWindow]:
-    """Yield the windows of a body with a sensor, which is rigid while the sensor is inactive."""
+    """Yield the windows of a body with a sensor; the body is rigid while the sensor is inactive."""
     active = find_active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
@@ -366,7 +373,7 @@ def _follow_sensor(
 
 
 def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
-    """Return the window of a part that the starter makes rigid (Irigid) and nothing switches."""
+    """Return the window of a part that the starter makes rigid (Irigid) and that nothing switches."""
     unit = Unit(body.part)
     by = LegSwitch(body.card, "plain", None, (), ())
     return SwitchWindow(
@@ -377,7 +384,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return, for each body, the parts that its group names, or whose nodes all belong to the group.
+    """Return the parts that the group of a body names, or whose nodes all belong to the group, keyed by body.
 
     Parameters
     ----------
@@ -436,7 +443,7 @@ def find_parts_off(run: RadiossRun) -> tuple[int, ...]:
 
 
 def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
-    """Return the parts of the bodies that are always on, because no engine run and no sensor switches them.
+    """Return the parts of the bodies that are always active, because no engine run and no sensor switches them.
 
     If there are no engine files, all bodies of /RBODY may be switched, but bodies of parts with Irigid stay rigid.
     """
@@ -455,7 +462,7 @@ def find_parts_of_fixed_bodies(run: RadiossRun) -> set[int]:
 
 
 def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
-    """Return, by part, the sensor that switches the rigid body of the part."""
+    """Return the sensor that switches the rigid body of each part, keyed by part id."""
     sensors = {
         body.node.value: body
         for body in starter.bodies
@@ -484,7 +491,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies that contain complete parts and that no engine run names, in a run with ``windows``.
+    """Return the bodies with complete parts that no engine run names, in a run with rigid ``windows``.
 
     None if there are none.
     """

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Row
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # Function that returns the time spans in which the force of an interface or rigid wall acts, or None.
+    # A function that returns the time spans in which the force of an interface or rigid wall acts, or None.
     Forces = Callable[[str, int], Spans | None]
 
 # First input version in which a time sensor has an end (Tstop).
 STOPS_SINCE: Final = 2023
 NEVER: Final = 1e20  # Smallest time that is treated as never reached.
-# Kinds of force sensors, with the names of their forces in histories.
+# Kinds of force sensors, each with the name of its force in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
 # Types of /INTER that exert no contact force on a flying body, such as ties.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
@@ -42,7 +42,7 @@ _SINGLE: Final = 1e-6
 
 
 class Course(NamedTuple):
-    """Data of a run that determine when sensors are active: its end, its restarts, and when forces act.
+    """Data of a run that determine when sensors are active: its end, its restarts, and the times of forces.
 
     The time of the first reset of each sensor, and the spans in which contact forces act [time].
 
@@ -55,7 +55,7 @@ class Course(NamedTuple):
     forces: Forces | None = None
 
     def find_contacts(self, kind: str, number: int) -> Spans | None:
-        """Return the spans in which an interface or rigid wall has a force [time]; None if no history shows them."""
+        """Return the spans in which an interface or rigid wall exerts a force [time]; None if no history shows them."""
         written = self.forces(kind, number) if self.forces else None
         return self.contacts if written is None else written
 
@@ -69,7 +69,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Return the time spans in which a sensor is active, in order, or a string that says what is unknown.
+    """Return the time spans in which a sensor is active, in order, or a string that states what is unknown.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.
@@ -173,7 +173,7 @@ def find_contacts_of_sensor(
 
 
 def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
-    """Return the input sensors of a sensor."""
+    """Return the sensors that are the inputs of a sensor."""
     card = starter.sensors.get(number)
     rows = (
         get_lines_below_title(card)

@@ -75,7 +75,7 @@ _PATHS: Final = (
     "INCLUDE_PATH_RELATIVE",
 )
 _LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled at its first use, to keep start-up fast.
-# Pattern of keywords that seem to be switching cards.
+# Pattern of keywords that resemble those of switching cards.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # Largest depth of nested includes.
@@ -84,7 +84,7 @@ _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Engine keywords that need values. A file that ends with such a keyword line is truncated.
+# Engine keywords that need values; a file that ends with such a keyword line is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -103,7 +103,7 @@ _WITH_VALUES: Final = (
 
 
 class Unread(NamedTuple):
-    """An include file that was not read: its name as written, and the reason."""
+    """An include file that was not read: its name as written in the deck, and the reason."""
 
     name: CardField
     reason: str
@@ -133,7 +133,7 @@ def _read_include_card(
 
 
 def _read_file_names(card: Card) -> Iterator[tuple[CardField, list[Row]]]:
-    """Yield each file name and the rows after it.
+    """Yield each file name on a card, and the rows after it.
 
     A name that ends with blank and plus continues on the next line; parameters in it are replaced.
     """
@@ -154,7 +154,7 @@ def _read_file_names(card: Card) -> Iterator[tuple[CardField, list[Row]]]:
 def _read_transform(
     card: Card, rows: list[Row]
 ) -> tuple[Transform, tuple[Problem, ...]]:
-    """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank and a factor of 0 mean no change."""
+    """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank or a factor of 0 means no change."""
     id_columns = [
         *((0, ID_OFFSETS[f"ID{letter}OFF"]) for letter in "NPMS"),
         (1, OTHER_OFFSET["IDROFF"]),
@@ -206,7 +206,7 @@ def _make_portable(name: str) -> str:
 
 @dataclass(eq=False, repr=False)
 class Deck:
-    """A deck as read: its ``cards`` that matter, ``disabled`` cards (*COMMENT), encrypted blocks and includes.
+    """A deck after reading: the relevant ``cards``, the ``disabled`` cards (*COMMENT), encrypted blocks and includes.
 
     ``problems`` are unreadable numbers of includes. ``ends`` are the last blocks of files without *END, and True for
     the main file. ``restarts`` are the restarts that continue its run.
@@ -222,14 +222,14 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    # The value is True if the main file is in long format at its end.
+    # True if the main file is in long format at its end.
     long: bool = False
-    # Restarts of the run by file name.
+    # Restarts of the run, keyed by file name.
     restarts: dict[str, Restart] = field(default_factory=dict)
 
     @property
     def files(self) -> list[str]:
-        """Return the names of all files that were read, the main deck first."""
+        """Return the names of all files that were read, with the main deck first."""
         return [source.name for source in self.sources]
 
     def named(self, *names: str) -> list[Card]:
@@ -242,7 +242,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards by name and by each prefix of the name before an ``_``, because rules request both."""
+        """Return the cards, keyed by name and by each prefix of the name before an ``_``; rules request both."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):
@@ -269,12 +269,12 @@ class Deck:
 
     @property
     def _all(self) -> list[Card]:
-        """Return all cards that a finding may point to."""
+        """Return all cards that a finding may refer to."""
         return [*self.cards, *self.disabled, *self.included]
 
     @cached_property
     def _by_line(self) -> defaultdict[str, list[Card]]:
-        """Return the cards of each file, by line."""
+        """Return the cards of each file in the order of lines, keyed by file name."""
         cards_by_file: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self._all:
             cards_by_file[card.file].append(card)
@@ -283,7 +283,7 @@ class Deck:
         return cards_by_file
 
 
-@lru_cache(1024)  # Decks use the same keywords repeatedly.
+@lru_cache(1024)  # Results are cached, because decks use the same keywords repeatedly.
 def _list_stems(name: str) -> tuple[str, ...]:
     """Return a name and each of its prefixes that end before an ``_``."""
     return tuple(
@@ -344,7 +344,7 @@ class _Reader:
         self.deck = deck
         # Folders named by *INCLUDE_PATH, in the order of the cards.
         self.folders: list[Path] = []
-        # Files by path, so that a file that is included twice is read in one state.
+        # Files, keyed by path, so that a file that is included twice is read only once.
         self.sources: dict[str, SourceFile] = {}
 
     def read(self, source: SourceFile, context: _Context) -> None:
@@ -428,7 +428,7 @@ class _Reader:
                 )
 
     def find(self, name: CardField) -> str | None:
-        """Return the path of an include file in the form for messages; None if no such file exists.
+        """Return the path of an include file in the form used in messages; None if no such file exists.
 
         Programs that read decks disagree whether the folder of the main deck, *INCLUDE_PATH or the folder of the
         including file comes first. All are tried in this order, and the first file found is used.
@@ -451,7 +451,7 @@ class _Reader:
 
 
 def explain_unread(path: str | None, chain: Sequence[str]) -> str:
-    """Return why an include file is not read; empty if it is read.
+    """Return the reason why an include file is not read; empty if it is read.
 
     ``chain`` are the real paths of the files that include it.
     """
@@ -465,7 +465,7 @@ def explain_unread(path: str | None, chain: Sequence[str]) -> str:
 
 
 def _parse_keyword(head: str) -> tuple[str, str]:
-    """Return the name of a keyword in upper case, and its format suffixes.
+    """Return the keyword in upper case without format suffixes, and these suffixes.
 
     Examples
     --------
@@ -487,7 +487,7 @@ def _parse_keyword(head: str) -> tuple[str, str]:
 
 
 def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
-    """Yield the last block of each file that seems to be truncated, and the evidence.
+    """Yield the last block of each file that seems to be truncated, with the evidence.
 
     An include may have no *END. A main file without *END is reported if it ends within a mesh, because the program that
     writes a mesh also writes the end. A last line without line end may lack digits of a number.
@@ -514,7 +514,7 @@ def has_mesh(block: Block) -> bool:
 
 
 def _has_whole_end(block: Block) -> bool:
-    """Return True if an unterminated last line is complete: a comment, or a keyword that takes no values."""
+    """Return True if an unterminated last line is complete: a comment, or a keyword without values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
         return True
@@ -527,7 +527,7 @@ def _has_whole_end(block: Block) -> bool:
 
 
 def _find_sign_of_cut(block: Block, *, main: bool) -> str:
-    """Return the evidence that a file is truncated, or an empty string."""
+    """Return the evidence that a file is truncated; empty if there is none."""
     mesh = has_mesh(block)
     radioss = block.head.startswith("/")
     if not block.source.ends_with_line() and not _has_whole_end(block):

@@ -35,12 +35,12 @@ def is_restart(path: str) -> bool:
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # The check of the deck reports this error.
+        return False  # The error is reported by the check of the deck.
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
 def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
-    """Return a run with its restarts as one deck, in which the cards of the restarts have a time.
+    """Return a run and its restarts as one deck, in which each card of a restart has a time.
 
     The times stay unknown unless each run has an end later than the one before.
 

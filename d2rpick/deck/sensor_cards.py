@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def write_time_sensor(
     number: int, title: str, start: float, stop: float | None = None
 ) -> str:
-    """Return a sensor that becomes active at ``start`` and inactive at ``stop`` if ``stop`` is given [time]."""
+    """Return the card of a sensor that is active from ``start`` on, until ``stop`` if ``stop`` is given [time]."""
     text = f"/SENSOR/TIME/{number}\n{title}\n{DELAY.write(Tdelay=write_number(start, 20))}\n"
     if stop is None:
         return text
@@ -23,14 +23,14 @@ def write_time_sensor(
 
 
 def write_force_sensor(number: int, kind: str, entity: int, wait: float) -> str:
-    """Return a sensor that is active while a contact or rigid wall has a force, and for ``wait`` after it [time]."""
+    """Return the card of a sensor active while a contact or wall exerts a force, and for a further ``wait`` [time]."""
     delay = DELAY.write(Tdelay=write_number(wait, 20))
     force = FORCE_SENSOR.write(ID=entity, Dir="NF", Fmin=-1.0)
     return f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{delay}\n{force}\n"
 
 
 def write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) -> str:
-    """Return a sensor of kind OR, AND or NOT with one or two other sensors as inputs."""
+    """Return the card of a sensor of kind OR, AND or NOT, with one or two other sensors as inputs."""
     names = ("sens_ID1", "sens_ID2")[: len(inputs)]
     row = SENSOR_INPUTS.write(**dict(zip(names, inputs, strict=True)))
     return f"/SENSOR/{kind}/{number}\n{title}\n{DELAY.write(Tdelay=0)}\n{row}\n"

@@ -21,27 +21,27 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# The search processes this number of bytes at a time, so that its buffer fits into the processor's cache.
+# Number of bytes that are searched at once, so that the search buffer fits into the processor's cache.
 _SEARCHED: Final = 3 << 18
 # Number of additional threads; they copy bytes in parallel, but only one thread searches at a time.
 _HELPERS: Final = 1
-# Number of pieces that one thread processes before a second thread has started.
+# Number of blocks that one thread searches before a second thread is started.
 _ALONE: Final = 4
-# The search repeats this number of bytes before a piece, because a mark may cross the start of the piece.
+# Number of bytes before a block that are searched again, because a mark may cross the start of the block.
 _LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-# Offset of a letter of the mark that mesh data never contains, so that the search for it is fast.
+# Offset of a letter of the mark that mesh data never contains, so that the search for this letter is fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 
-# Complete lines are processed in pieces of this number of bytes.
+# Number of bytes in which complete lines are processed at once.
 _PIECE: Final = 4 << 20
-# Number of parts of a piece in which line ends are counted; each part fits into the processor's cache.
+# Number of sections of a block in which line ends are counted; a section fits into the processor's cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # The first line end is expected in this number of bytes.
-_HEAD: Final = 1024  # At most this number of bytes of a keyword line is read.
-# Comments on a keyword are expected in this number of bytes before the keyword.
+_FIRST: Final = 1 << 16  # Number of bytes in which the first line end is expected.
+_HEAD: Final = 1024  # Largest number of bytes of a keyword line that are read.
+# Number of bytes before a keyword in which comments on the keyword are expected.
 _BEFORE: Final = 4096
 # This pattern is compiled at its first use, to keep start-up fast.
 _SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
@@ -69,7 +69,7 @@ def find_marks(
 
 
 class _Search:
-    """A search of a file by several threads, each of which searches the next piece."""
+    """A search of a file by several threads, each of which searches the next block."""
 
     def __init__(self, file: HeldInMemory | DeckOnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
@@ -83,11 +83,11 @@ class _Search:
         )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
-        # Locks of the helping threads; each thread releases its lock when it ends.
+        # Locks of the additional threads; each thread releases its lock when it ends.
         self._helping: list[_thread.LockType] = []
 
     def call_for_help(self) -> None:
-        """Start an additional thread and return at once."""
+        """Start an additional thread, and return at once."""
         helping = _thread.allocate_lock()
         helping.acquire()
         with suppress(
@@ -97,7 +97,7 @@ class _Search:
             self._helping.append(helping)
 
     def _help(self, helping: _thread.LockType) -> None:
-        """Search in an additional thread; if an error occurs, its pieces are left to `result`."""
+        """Search in an additional thread; after an error, its blocks are left to `result`."""
         try:
             with suppress(DeckError, OSError, MemoryError):
                 self.go_on()
@@ -105,7 +105,7 @@ class _Search:
             helping.release()
 
     def go_on(self) -> None:
-        """Search the remaining pieces in one buffer, because new memory costs more than copying into it."""
+        """Search the remaining blocks in one buffer, because new memory costs more than copying into it."""
         marks_by_piece: dict[int, Sequence[int]] = {}
         piece = bytearray(_LOOKBACK + min(self._piece, self._file.size))
         with self._file.opened() as fill:
@@ -121,11 +121,11 @@ class _Search:
                     )
                 else:
                     marks_by_piece[begin] = ()
-        # This check shows whether the file has changed during the search.
+        # This check shows whether the file changed during the search.
         self._found |= marks_by_piece
 
     def stop(self) -> None:
-        """Take all remaining pieces from the other threads, and wait until the threads have ended."""
+        """Take all remaining blocks from the other threads, and wait until the threads have ended."""
         self._waiting = iter(())
         for helping in self._helping:
             helping.acquire()
@@ -168,7 +168,7 @@ def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
 
 
 def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
-    # A header that crosses the end of this piece is found in the next piece, which repeats the end of this one.
+    # A header that crosses the end of this block is found in the next block, which repeats the end of this one.
     """Return the offsets of the headers of encrypted blocks."""
     offsets = []
     at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
@@ -186,7 +186,7 @@ def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 class SourceFile:
-    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of one state of the file.
+    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of the same snapshot of the file.
 
     ``name`` is the path for messages. ``content`` is given if the content is not in a file or the file is open already.
     ``piece`` bytes are processed together. Line numbers are counted on request: in a large deck counting takes longer
@@ -210,7 +210,7 @@ class SourceFile:
         elif isinstance(content, bytes):
             content = HeldInMemory(content)
         self._file = content
-        # Ascending offsets at which the line number is known, with that number.
+        # Ascending offsets at which the line number is known, with these numbers.
         self._counted = [(0, 1)]
         self._longest = bound("LINE")
 
@@ -244,7 +244,7 @@ class SourceFile:
         return self._file.read(start, self._file.size if end is None else end)
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
-        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in pieces that end with a line end."""
+        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in blocks that end with a line end."""
         end = min(self._file.size, self._file.size if end is None else end)
         size = self._piece
         while start < end:
@@ -256,7 +256,7 @@ class SourceFile:
                 yield piece
                 start += len(piece)
             else:
-                size *= 2  # The line is longer than a piece.
+                size *= 2  # The line is longer than a block.
 
     def text(self, start: int, end: int | None) -> str:
         """Return the bytes from ``start`` to ``end`` as Latin-1 text."""
@@ -287,12 +287,12 @@ class SourceFile:
         return digest.hexdigest()
 
     def ends_with_line(self) -> bool:
-        """Return True if the last line has a line end, or the file is empty."""
+        """Return True if the last line has a line end, or if the file is empty."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules. A large file is not searched for them and gives True."""
+        """Return True if comments may silence rules. A large file is not searched for such comments and gives True."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
@@ -334,7 +334,7 @@ class Block:
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Return the data lines, but no comments, each with the number of lines from the keyword line."""
+        """Return the data lines without comments, each with its number of lines from the keyword line."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
         # If this line were kept, the block would contain the blanks before the next keyword.

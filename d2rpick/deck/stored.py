@@ -1,4 +1,4 @@
-"""Store the bytes of a deck file, all from one state of the file: in memory, or read on request.
+"""Provide the bytes of a deck file as one consistent snapshot, either held in memory or read on request.
 
 An editor or a pre-processor may save a deck again while its rows are still to be read. A small file is kept in memory.
 A large file is opened for each read, so that many includes do not use up the open files of a process; an error is
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    # Type of a function that copies the bytes between two offsets into a buffer, and returns their number.
+    # A function that copies the bytes between two offsets into a buffer, and returns their number.
     Filling = Callable[[bytearray, int, int], int]
 
 
 # Size of the largest file that is kept in memory [bytes]; a deck may have thousands of include files.
 HELD_UP_TO: Final = 1 << 18
-# Smallest number of bytes read at a time, because the next request is mostly for nearby bytes.
+# Smallest number of bytes read at a time, because the next request is usually for nearby bytes.
 _WINDOW: Final = 1 << 16
-# Number of cached pieces of a file, because the ends of large blocks are read repeatedly.
+# Number of cached blocks of a file, because the ends of large blocks are read repeatedly.
 _KEPT: Final = 8
 
 
@@ -60,7 +60,7 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        # Pieces of the file by offset, the oldest piece first.
+        # Blocks of the file, keyed by offset, with the oldest block first.
         self._windows: dict[int, bytes] = {}
 
     def read(self, begin: int, end: int) -> bytes:
@@ -109,7 +109,7 @@ class DeckOnDisk:
 
 
 def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
-    """Return the bytes of a file: in memory if it is small or not a regular file.
+    """Return the bytes of a file; they are in memory if the file is small or not a regular file.
 
     Raises
     ------

@@ -23,7 +23,7 @@ _FIRST: Final = 901
 
 
 class Suiting(NamedTuple):
-    """What a deck requires of a card; None and False mean that there is no requirement.
+    """Requirements of a deck for a card; None and False mean that there is no requirement.
 
     ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
     switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the
@@ -87,7 +87,7 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Return True if there are constraints and all belong to these parts alone, so that they may be deleted."""
+    """Return True if there are constraints and all of them belong to these parts alone, so that they may be deleted."""
     if not constraints:
         return False
     # Imported here to keep start-up fast.

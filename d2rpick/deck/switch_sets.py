@@ -25,7 +25,7 @@ _DELETE, _ACTIVATE = 1, 2
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the D2R lines of given parts or their part sets, with lead parts first."""
+    """Yield the D2R lines of given parts or of their part sets, with lead parts first."""
     yield TO_RIGID.write_names()
     for lead, members in group_by_lead(ids, printing).items():
         yield from (
@@ -37,7 +37,7 @@ def write_rigid_lines(
 def write_deformable_lines(
     ids: Sequence[int], part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the R2D lines of given parts, or of their part set."""
+    """Yield the R2D lines of given parts, or the line of their part set."""
     yield TO_DEFORMABLE.write_names()
     yield from (
         TO_DEFORMABLE.write(PID=name, PTYPE=kind)
@@ -46,7 +46,7 @@ def write_deformable_lines(
 
 
 def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Return the parts grouped by their lead part; parts that have no lead part come first, under 0."""
+    """Return the parts grouped by their lead part, with parts without a lead part first, under 0."""
     leads = _find_leads(ids, printing)
     by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):

@@ -1,4 +1,4 @@
-"""Read the switching cards of LS-DYNA field by field, and find the rigid windows that the cards of any solver make.
+"""Read the LS-DYNA switching cards field by field, and find the rigid windows that the cards of either solver define.
 
 The cards are *DEFORMABLE_TO_RIGID, its variants, and the restart cards *RIGID_DEFORMABLE.
 
@@ -60,7 +60,7 @@ class Switched(NamedTuple):
     part: Value[int]
     by_set: bool
     to_rigid: bool
-    lead: Value[int] | None = None  # Value of LRB, which only D2R lines contain.
+    lead: Value[int] | None = None  # Value of LRB, which occurs only in D2R lines.
 
 
 class SwitchHeader(NamedTuple):
@@ -85,7 +85,7 @@ class SwitchHeader(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class SwitchSet:
-    """One switching card as read: its header, if it has one, and its parts.
+    """One switching card: its header, if it has one, and its parts.
 
     ``count_problem`` says how lines and counts differ, or is empty. ``values`` are all its fields.
     """
@@ -119,7 +119,7 @@ class SwitchSet:
 
     @property
     def time_field(self) -> CardField:
-        """Return the field that contains the switching time; if the card has no such field, return the keyword.
+        """Return the field that contains the switching time, or the keyword if the card has no such field.
 
         This time is TIME1, or the end of the run before a restart.
         """
@@ -157,7 +157,7 @@ def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
 
 
 def _read_simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
-    """Read a switching card that has no header lines."""
+    """Read a switching card without header lines."""
     restart = restart if kind == "restart" else None
     rows = card.lines
     if kind == "inertia":
@@ -244,7 +244,7 @@ def _read_automatic(card: Card) -> SwitchSet:
 
 
 def _describe_missing(rows: Sequence[Row]) -> str:
-    """Say which header lines are missing, or replaced by a part line; empty if no header line is missing."""
+    """Describe which header lines are missing, or replaced by a part line; empty if no header line is missing."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
@@ -268,7 +268,7 @@ def _is_part_line(row: Row) -> bool:
 
 
 def _count_lines(count: int) -> str:
-    """Say how many part lines follow the header lines."""
+    """Describe how many part lines follow the header lines."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
@@ -384,7 +384,7 @@ def _make_switch_set(
 
 
 class Unit(NamedTuple):
-    """A unit of switching: a part, or a part set or rigid body (by its main node) whose parts are unknown."""
+    """What a card switches: a part, or a part set or rigid body (given by its main node) whose parts are unknown."""
 
     id: int
     is_set: bool = False
@@ -399,12 +399,12 @@ class Unit(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """Return the part id, or None if the unit is a part set or rigid body whose parts are unknown."""
+        """Return the part id; None for a part set or rigid body whose parts are unknown."""
         return None if self.is_set or self.is_body else self.id
 
 
 class SwitchEvent(NamedTuple):
-    """A switch of one unit, made by a line of a card."""
+    """A switch of one part or other unit, caused by a line of a card."""
 
     unit: Unit
     by: SwitchSet
@@ -412,7 +412,7 @@ class SwitchEvent(NamedTuple):
 
 
 class SwitchWindow(NamedTuple):
-    """A rigid window of a unit from ``tr`` to ``td`` [time of the deck]; ``td`` is None if the unit stays rigid.
+    """A rigid window of a part or other unit from ``tr`` to ``td`` [time of the deck]; ``td`` is None if it has no end.
 
     ``td`` may be earlier than ``tr`` if the cards say so, which a rule reports.
     """
@@ -464,7 +464,7 @@ def find_windows(
     windows: list[SwitchWindow] = []
     orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
-        # At equal times the switch back comes first, so that there is no window of length 0.
+        # At equal times, the switch back comes first, so that there is no window of length 0.
         unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
@@ -483,7 +483,7 @@ def find_windows(
 
 
 def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
-    """Yield the switches that a card makes, one for each part."""
+    """Yield the switches that a card causes, one for each part."""
     for line in card.switched:
         if line.part.problem:
             continue
@@ -497,7 +497,7 @@ def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
 def follow_unit(
     unit: Unit, events: Iterable[tuple[float, SwitchEvent]]
 ) -> tuple[list[SwitchWindow], list[tuple[float, SwitchEvent]]]:
-    """Return the windows of a unit from its events in order, and the switches back that find it already deformable."""
+    """Return the windows of a part or other unit from its ordered events, and switches back while it is deformable."""
     windows: list[SwitchWindow] = []
     orphans: list[tuple[float, SwitchEvent]] = []
     opened: tuple[float, SwitchEvent] | None = None

@@ -1,4 +1,4 @@
-"""Find the parts that must not be switched regardless of their energy, and the reasons.
+"""Find the parts that must not be switched whatever their energy, with the reasons.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
 has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # Formulations of *SECTION_SOLID (ELFORM) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
-# Patterns of *MAT keywords of laws with a stress-free reference state, by name and by number.
+# Patterns of the *MAT keywords of material laws with a stress-free reference state, by name and by number.
 _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
@@ -67,7 +67,7 @@ class Unswitchable(NamedTuple):
 def find_unswitchable_in_ls_dyna(
     deck: Deck, parts: DeckParts
 ) -> dict[int, Unswitchable]:
-    """Return the parts of an LS-DYNA deck that must not be switched, by part id, from their sections and materials."""
+    """Return the parts of an LS-DYNA deck that must not be switched, keyed by part id, from sections and materials."""
     sections = read_sections(deck)
     laws = {
         name_material(card, card.data[0], MATERIAL["MID"]): card.name
@@ -88,7 +88,7 @@ def find_unswitchable_in_ls_dyna(
 
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
-    """Return the parts of a starter deck that must not be switched, by part id, from their materials and properties."""
+    """Return the parts of a starter deck that must not be switched, keyed by part id, from materials and properties."""
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_deck import get_number
 
@@ -117,7 +117,7 @@ def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
 
 
 def _read_strain_flags(starter: Starter) -> Mapping[int, int]:
-    """Return the Ismstr of the properties of solids, by property id."""
+    """Return the Ismstr of solid properties, keyed by property id."""
     from d2rpick.deck.radioss_deck import SOLIDS, get_lines_below_title, get_number
 
     solids = [
@@ -138,7 +138,7 @@ def _make_flowing(how: str) -> Unswitchable:
 
 
 def _make_with_reference(how: str) -> Unswitchable:
-    """Return the reason for a part whose material law keeps a stress-free reference state."""
+    """Return the reason for a part whose material law has a stress-free reference state."""
     return Unswitchable(
         False, f"its law keeps a stress-free reference ({how}), {_GAINS}"
     )

@@ -55,7 +55,7 @@ _ONCE = {
     "END",
 }
 
-# An engine run writes its restart file only at its end.
+# Engine keywords that are not repeated, because an engine run writes its restart file only at its end.
 _NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -157,7 +157,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError if the deck already switches a part of the printed cards, or uses one of their set ids."""
+    """Raise DeckError if the deck already switches a part on the printed cards, or uses one of their set ids."""
     sets = read_switching(deck)
     printed_sets = read_switching(printed)
     parts = {
@@ -194,7 +194,7 @@ def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> b
 def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of the files in the folder of the deck and below; other files need an absolute path."""
+    """Yield name and content of the files in and below the folder of the deck; other files need an absolute path."""
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100  resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100  resolve() would follow links out of the folder
@@ -219,7 +219,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_unlike(run.legs)
     main_source = starter_deck.sources[0]
     starter = main_source.name
-    # The engine looks for a restart file whose name begins with the run name of the engine file.
+    # The engine looks for a restart file whose name begins with the run name in the engine file.
     root = find_root(starter) or leg.name
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(starter_deck, card)
@@ -243,7 +243,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _require_starter(main: str, run: RadiossRun) -> Starter:
-    """Return the starter deck of a run; raise DeckError if the run has no starter deck, or no engine file."""
+    """Return the starter deck of a run; raise DeckError if the run lacks a starter deck or an engine file."""
     if run.starter is None or not run.legs:
         missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
@@ -267,7 +267,7 @@ def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
 def _keep_bodies_off(
     legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
 ) -> Iterator[str]:
-    """Return the lines that keep bodies inactive in a printed engine run; they would be rigid from time 0 otherwise.
+    """Return lines that keep bodies inactive in a printed engine run; otherwise, they would be rigid from time 0.
 
     Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
     """
@@ -277,7 +277,7 @@ def _keep_bodies_off(
         node for node in find_bodies_kept_off(legs) if node not in switched_nodes
     ]
     if printed_leg.cap is None:
-        # An engine run that has no time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
+        # An engine run without a time-step limit ends with an /RBODY/OFF card, to which these lines are appended.
         return write_numbers(off_nodes)
     return write_bodies_off(off_nodes)
 
@@ -314,7 +314,7 @@ def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
 
 
 def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
-    """Return a file of the starter deck in which sensors switch bodies; ``sensors`` are given by main node.
+    """Return a file of the starter deck in which ``sensors``, keyed by main node, switch bodies.
 
     The /BEGIN of the file gets a version in which time sensors have an end.
 
@@ -362,7 +362,7 @@ def _edit_lines(
 
 
 def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
-    """Raise DeckError if the deck has a sensor with an id of the card, or lacks a body for a sensor."""
+    """Raise DeckError if the deck has a sensor with an id on the card, or lacks a body for a sensor."""
     added = Starter(
         blocks=[*read_blocks(SourceFile("the card", card.starter.encode()))]
     )
@@ -378,7 +378,7 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
 
 
 def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
-    """Raise DeckError if a later engine run has keywords that the first lacks; no run could represent both."""
+    """Raise DeckError if a later engine run has keywords that the first lacks; no single run could represent both."""
     first = {read_block(block) for block in read_blocks(legs[0].run.block.source)}
     for leg in legs[1:]:
         for block in read_blocks(leg.run.block.source):
@@ -397,7 +397,7 @@ def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
 def _refuse_other_run(
     leg: RadiossLeg, root: str, printed: Sequence[RadiossLeg]
 ) -> None:
-    """Raise DeckError if the cards are for another run, or the run already switches their bodies."""
+    """Raise DeckError if the cards are for another run, or if the run already switches their bodies."""
     if printed[0].name not in (leg.name, root):
         raise DeckError(
             f"the cards are for run {printed[0].name!r}, but this is run {leg.name!r}; print them with this name"
@@ -479,7 +479,7 @@ class DrivenDeck(NamedTuple):
 
 
 def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
-    """Read a run that is to be driven.
+    """Read a run whose switch times are to be chosen while the run is computed.
 
     Parameters
     ----------
@@ -546,7 +546,7 @@ def _read_end(leg: RadiossLeg) -> float:
 
 
 def _read_interval(leg: RadiossLeg) -> float:
-    """Return the output interval of the time history, in which contacts have to be visible [time]."""
+    """Return the output interval of the time history [time], which must be short enough to show contacts."""
     for block in read_blocks(leg.run.block.source):
         card = make_card(block)
         if (

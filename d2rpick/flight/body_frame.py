@@ -1,4 +1,4 @@
-"""Find the frame of a body in flight: how its parts, or nodes with written motion, are rotated relative to the deck."""
+"""Find the frame of a body in flight: the rotation of its parts, or of nodes with output, relative to the deck."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import NodeMotion, Samples
     from d2rpick.histories.names import Part
 
-# Function that reads the written motion of given nodes, and leaves out nodes whose motion is not written.
+# A function that reads the motion of given nodes, without the nodes whose motion the solver did not write.
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
-# Largest deviation of points from their positions in the rotated deck, relative to the size of the body.
-# The orientation of a body with a larger deviation cannot be determined to 0.1 degrees.
+# Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
+# The orientation of a body with a larger deviation cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Connected parts define the body frame if they have at least this share of the mass of the body [-].
+# Smallest mass fraction of the connected parts that define the frame of a body [-].
 _MOST: Final = 0.5
-# Points are treated as lying on a line if one moment of inertia is below this share of the others.
+# Largest ratio of one moment of inertia to the others at which points are treated as lying on a line [-].
 _ALONG_LINE: Final = 1e-9
-# Number of nodes, spread over the body, that define its frame; more nodes would hardly improve it.
+# Number of nodes, spread over the body, that define the frame of the body; more would hardly improve it.
 _MOST_NODES: Final = 50
 
 
 class Frame(NamedTuple):
-    """Orientation of a body: ``axes`` (n, 3, 3) rotate directions of the deck to those at each time.
+    """Orientation of a body: ``axes`` (n, 3, 3) rotate directions in the deck to the directions at each time.
 
     ``doubt`` is the angle by which bending of the body turns its frame from one time to another [rad].
     """
@@ -39,7 +39,7 @@ class Frame(NamedTuple):
 
 
 def fit_frame(deck: Samples, where: Samples, mass: Samples) -> Frame | None:
-    """Fit the orientation of points of a body to their places.
+    """Fit the orientation of the points of a body to their positions.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def choose_frame_parts(
     masses: Samples,
     placement: Placement,
 ) -> Sequence[int]:
-    """Return the parts that define the body frame: connected parts that do not move relative to each other.
+    """Return the parts that define the frame of a body: connected parts that do not move relative to each other.
 
     ``members`` and ``moving`` are columns of the ``parts``, which have these ``masses`` (parts,).
     """
@@ -103,7 +103,7 @@ def choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return how much the rotation between two times changes if each part that defines the frame is left out in turn.
+    """Return how much the rotation between two times changes if each part that defines the frame is omitted in turn.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
     line determine no angle and give 0.
@@ -133,7 +133,7 @@ def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 
 def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return the deviation of points from their shape, relative to its size across its longest axis.
+    """Return the deviation of points from their shape, relative to the size of the shape along its longest axis [-].
 
     Infinite if the points lie on a line.
     """
@@ -146,7 +146,7 @@ def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
 
 
 def compute_second_moments(places: Samples, mass: Samples) -> Samples:
-    """Return the second mass moments of positions."""
+    """Return the second mass moments of positions [mass * length^2]."""
     return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
-# An energy with at least this number of turning points may vibrate about a level; otherwise it must be constant.
+# Smallest number of extrema of an energy that may vibrate about a level; with fewer, it must be constant.
 _LEAST_TURNS: Final = 4
 
 
@@ -54,7 +54,7 @@ def choose_flight(
     after: float | None,
     landing: float | None,
 ) -> Flight:
-    """Choose the flight around ``td`` from the evidence and the user's times; supported parts never fly.
+    """Choose the flight around ``td`` from the evidence and the times given by the user; supported parts never fly.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def find_flight(
 def _make_seen_flight(
     history: History, seen: Seen, shown: FreeFlight, described: Described | None
 ) -> Flight:
-    """Return the flight that the evidence shows; an oscillator shows whether gravity acts if energies do not."""
+    """Return the flight that the evidence shows; if energies do not show gravity, an oscillator is used for this."""
     gravity = shown.gravity
     if described and seen.source in BY_ENERGIES and isnan(gravity):
         window = described._replace(start=shown.start, end=shown.end)
@@ -177,7 +177,7 @@ def start_flight_at(
     after: float,
     described: Described | None,
 ) -> Flight:
-    """Start the flight around ``td`` at the time ``after`` [time] at which the user says that the load ends.
+    """Start the flight around ``td`` at ``after`` [time], the end of the load as given by the user.
 
     Evidence against this becomes a doubt.  A contact that the evidence shows between ``after`` and td still ends the
     flight, since the user has said nothing about it.
@@ -204,7 +204,7 @@ def start_flight_at(
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
-    )  # The oscillator is fitted only after `after`, so its start does not show when the load ends.
+    )  # The oscillator was fitted after `after`, so its start does not show when the load ends.
     if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):
@@ -219,7 +219,7 @@ def start_flight_at(
 def end_flight_at(
     history: History, flight: Flight, td: float, landing: float
 ) -> Flight:
-    """End the flight around ``td`` at the time ``landing`` [time] of the next contact that the user gives.
+    """End the flight around ``td`` at ``landing`` [time], the next contact as given by the user.
 
     Evidence against this becomes a doubt.
     """
@@ -256,7 +256,7 @@ def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:
 
 
 def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
-    """Return the doubts about a user-given flight, with the reason why the evidence shows no flight."""
+    """Return the doubts about a flight given by the user, with the reason why the evidence shows no flight."""
     if not flight.refusal:
         return flight.doubts
     return (
@@ -266,12 +266,12 @@ def _add_refusal_to_doubts(flight: Flight) -> tuple[str, ...]:
 
 
 def _find_end_of_window(history: History, described: Described) -> float | None:
-    """Return the end of the window that an oscillator describes; None if the window lasts to the end of the record."""
+    """Return the end of the window that an oscillator describes [time]; None if it lasts to the end of the record."""
     return described.end if described.end < history.end else None
 
 
 def _detect_load_in_window(history: History, described: Described) -> float:
-    """Return NaN if damping of the vibration cannot explain how much the energies in a window change, else 0."""
+    """Return NaN if damping of the vibration cannot explain the energy change in a window, otherwise 0."""
     from d2rpick.flight.work import is_taken_by_damping
 
     if history.balance is None:

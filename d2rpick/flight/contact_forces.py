@@ -1,4 +1,4 @@
-"""Find flights from contact and rigid-wall forces: a flight is a window without such a force.
+"""Find flights from contact and rigid-wall forces: a flight is a window without any such force.
 
 Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
 its parts, and a contact whose force is not written, or any other load, may act all the same.
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import History, Momenta, Samples
 
-# An external contact changes the momentum of the model by at least this share of its impulse [-].
+# Smallest momentum change of the model, as a fraction of a contact's impulse [-], that shows an external contact.
 # The output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
-# _PIECES: number of pieces of a flight whose mean energies are compared.
-# _RISE: a mean energy that rises by this share of the highest energy shows a crash.
+# _PIECES: number of sections of a flight whose mean energies are compared.
+# _RISE: smallest rise of the mean energy that shows a crash, as a fraction of the highest energy [-].
 # In computed flights with many beating modes, the mean energy rises by up to 0.06 of the highest energy.
 # In a crash, the mean energy rises from nearly zero to nearly the highest energy.
 _PIECES: Final = 4
@@ -43,7 +43,7 @@ class Touches(NamedTuple):
     def of(
         cls, forces: Sequence[ContactForce], whole: Momenta | None = None
     ) -> Touches | None:
-        """Combine the forces of all intermittent contacts; return None if there are none.
+        """Combine the forces of all intermittent contacts; None if there are no such contacts.
 
         A contact that always acts holds parts together, like a tied one; one that never acts may belong to other parts.
         One that does not change the momentum of the ``whole`` model, if this is known, acts between the model's own
@@ -66,7 +66,7 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Return the window without contact around ``td`` [time]; None if it is too short or a contact acts at td.
+        """Return the window without contact around ``td`` [time]; None if it is too short, or if a contact acts at td.
 
         Forces do not show whether gravity acts, so gravity is NaN.
         """
@@ -95,7 +95,7 @@ class Touches(NamedTuple):
 def _select_outer_forces(
     forces: Sequence[ContactForce], whole: Momenta
 ) -> list[ContactForce]:
-    """Return the forces whose impulses change the momentum of the model, apart from a constant gravity.
+    """Return the forces whose impulses change the momentum of the model, apart from constant gravity.
 
     An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
     side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces
@@ -132,7 +132,7 @@ def _select_outer_forces(
 
 
 def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
-    """Return the impulses of a force between given times (m,), shape (m - 1, 3)."""
+    """Return the impulses of a force between successive times (m,), shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
     return np.diff(
         np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0
@@ -140,7 +140,7 @@ def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
-    """Return True if the internal energy rises during the flight, which shows a load that the files do not contain.
+    """Return True if the internal energy rises during the flight, which shows a load that is missing in the files.
 
     In a flight the energy vibrates about its level or falls by damping.
     """

@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# A change of momentum shows a force if it exceeds the largest deviation in the longest flight by this factor.
+# Smallest ratio of a momentum change to the largest deviation in the longest flight that shows a force [-].
 _SEEN: Final = 4.0
-# Forces below this share of the weight are ignored [-], because the momenta in the first state are half a step old.
+# Largest force that is ignored, as a fraction of the weight [-], because the first momenta are half a step old.
 _OF_WEIGHT: Final = 0.1
-# Number of states left out at each end of the longest flight, because a contact force may act in them.
+# Number of states omitted at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-# Smallest number of output intervals that the longest flight must have without its ends.
+# Smallest number of output intervals of the longest flight, without its ends.
 _FEWEST: Final = 2
-# A force that is detected in only one interval is assumed to act in its middle, for this share of its length [-].
+# Assumed duration of a force in the middle of the only interval that shows it, as a fraction of the interval [-].
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """Periods in which a force acts: ``spans`` (from, to) [time], each end is accurate to half of ``interval``.
+    """Periods in which a force acts: ``spans`` (from, to) [time]; each end is accurate to half of ``interval``.
 
     ``speed`` is the speed of the parts at the end of the longest flight [length/time], None if there are no masses.
     """
@@ -135,7 +135,7 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
 
 
 def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
-    """Return start and end of a force that acts in the intervals from ``first`` up to ``stop`` of the record.
+    """Return start and end [time] of a force that acts in the intervals from ``first`` up to ``stop`` of the record.
 
     A force in the first interval is assumed to act from the start of the record, one in the last interval to its end.
     """

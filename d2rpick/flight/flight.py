@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Names of the data that can show a flight, the most reliable first.
+# Names of the data that can show a flight, with the most reliable first.
 SOURCES: Final = (
     "given",
     "momentum",
@@ -43,19 +43,19 @@ SOURCES: Final = (
 )
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# Largest work that a load may do on the parts in a flight, as a share of their internal energy [-].
+# Largest work of a load on the parts in a flight, as a fraction of their internal energy [-].
 # This work causes a deformation error of 2 %; smaller errors do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
-# Sources that must confirm each flight from a better source, because they contain the contacts of all parts.
+# Sources that must confirm each flight from a more reliable source, because they cover the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# Sources that may miss a load, because some forces are not written, and fixed walls do no work.
+# Sources that may miss a load, because some forces are not written, and because fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Two ends of a flight agree if they differ by at most this share of its length, or by this many output intervals.
+# Largest difference of two flight ends that agree, as a fraction of the flight [-] and in output intervals [-].
 _SAME, _SAME_STATES = 0.01, 3
 
 
 class Flight(NamedTuple):
-    """A window of free flight [time]; ``start`` is None if it is unknown, ``end`` is None if no later contact was seen.
+    """A window of free flight [time]; ``start`` is None if unknown, ``end`` is None if the data show no later contact.
 
     If nothing flies at td, it is the last flight before td, or else the first one after it, and ``refusal`` gives the
     reason.  ``source`` is the evidence for the start, one of `SOURCES`.  ``parts`` are the parts seen to fly together,
@@ -113,7 +113,7 @@ def _return_false(_: float) -> bool:
 
 
 class Witness(NamedTuple):
-    """Data that show flights: the flight ``around`` a time, and all ``flights`` in ascending order.
+    """A source of evidence for flights: the flight ``around`` a time, and all ``flights`` in ascending order.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
     ``is_contradicted`` returns True for a time if only the internal energy speaks against a flight at that time.
@@ -136,7 +136,7 @@ class Witness(NamedTuple):
         decisive: bool,
         is_contradicted: Callable[[float], bool] = _return_false,
     ) -> Witness:
-        """Make a witness over the times ``time`` (n,) that computes each flight and the list of flights only once."""
+        """Make a source of evidence over the times ``time`` (n,) that computes each flight and their list only once."""
         once = cache(around)
         return cls(
             source,
@@ -187,7 +187,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is in none.
+    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is in no flight.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -216,7 +216,7 @@ def find_seen_flight(history: History, td: float) -> Seen:
 
 
 def _find_flight_by_evidence(history: History, td: float) -> Seen:
-    """Find the flight around ``td`` from the witnesses; supports are not considered yet."""
+    """Find the flight around ``td`` from all sources of evidence; supports are not considered yet."""
     flights: list[tuple[str, FreeFlight]] = []
     for witness in list_witnesses(history):
         flight = witness.holding(td)
@@ -235,7 +235,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 
 def _explain_refusal(witness: Witness, td: float) -> str:
-    """Return the reason why td [time] is in no flight, even if the momentum alone shows one."""
+    """Return the reason why td [time] is in no flight, even if the momentum alone shows a flight there."""
     if witness.is_contradicted(td):
         contradiction = (
             f"the momentum is that of free flight at td = {td:.6g}, but the internal "
@@ -246,7 +246,7 @@ def _explain_refusal(witness: Witness, td: float) -> str:
 
 
 def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Find all flights that the best source shows and no other source contradicts, each with its source."""
+    """Find all flights that the most reliable source shows and no other source contradicts, each with its source."""
     sources = list_witnesses(history)
     for rank, witness in enumerate(sources):
         confirmed_flights = []
@@ -281,7 +281,7 @@ def find_all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 
 
 def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
-    """Return True if a source may contradict a flight that a better source shows.
+    """Return True if a source may contradict a flight that a more reliable source shows.
 
     If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
     """
@@ -290,12 +290,12 @@ def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
 
 @remember
 def list_witnesses(history: History) -> tuple[Witness, ...]:
-    """Return the witnesses of the flights in a history, the most reliable first."""
+    """Return the sources of evidence for the flights in a history, with the most reliable first."""
     return tuple(_make_witnesses(history))
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Compute the witnesses of the flights in a history, the most reliable first."""
+    """Compute the sources of evidence for the flights in a history, with the most reliable first."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -390,7 +390,7 @@ def _find_flight_by_energies(
             and isinf(flight.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
-            # If there is no gravity, no load does work on a model in flight.
+            # Without gravity, no load does work on a model in flight.
             return None
         if not (flight and has_whole_motion(history.balance, flight.start, flight.end)):
             flight = None
@@ -454,7 +454,7 @@ def _limit_to_level(
             energy = np.interp(time, balance.time, balance.internal)
     start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
     if start is not None and start > flight.start and momenta is not None:
-        # The last sum of energies excludes the work of gravity, and the first sum includes it.
+        # The last sum of energies excludes the work of gravity, whereas the first sum includes it.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -474,7 +474,7 @@ def _limit_to_level(
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """Return the last flight before ``td``, or else the first flight after it, if td is in no flight."""
+    """Return the last flight before ``td``, or else the first flight after it, for a td that is in no flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (
@@ -484,13 +484,13 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return the name of the data that show a flight, in words."""
+    """Return the name in words of the data that show a flight."""
     return str(source).replace("-", " ")
 
 
 @remember
 def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> Seen:
-    """Combine the best source's flight with the flights of the sources that must confirm it, and note disagreements."""
+    """Combine the flight of the best source with those of the sources that must confirm it, and note disagreements."""
     source, best = shown_flights[0]
     refusal = _explain_why_driven(history, source, best)
     if refusal:
@@ -547,7 +547,7 @@ def _explain_why_driven(
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
-    """Return True if only some of the model's moving parts fly."""
+    """Return True if only some of the moving parts of the model fly."""
     momenta = history.find_momenta(of_parts=True)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False

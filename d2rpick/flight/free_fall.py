@@ -1,4 +1,4 @@
-"""Fit a free fall to a momentum, in which only gravity and mass-proportional damping act.
+"""Fit a free fall to a momentum: the only forces are gravity and mass-proportional damping.
 
 Parts that fly together obey p' = g - alpha p in each component, with constant g and one alpha >= 0, so that p(t) = p0 +
 g t - alpha int p dt, which is linear in p0, g and alpha.
@@ -30,46 +30,46 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, Momenta, Samples
 
-# _GRAVITY: gravity in m, inches and feet per second squared; other units differ by a power of 10.
-# _ALIKE: an acceleration is gravity within this relative deviation [-]; 1 load in 200 comes so close by chance.
+# _GRAVITY: gravity in m, inches and feet per second squared; in other units, it differs by a power of 10.
+# _ALIKE: largest relative deviation of an acceleration that is treated as gravity [-]; 1 load in 200 lies within it.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Ratio of the rounding error of the fitted change of momentum to that of the momentum itself [-].
+# Ratio of the rounding error of the fitted momentum change to the rounding error of the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
 # _ROUGHLY: relative tolerance for the size of gravity while a load fades [-].
-# _ALONG_AXIS: while a load fades, gravity has at least this direction cosine with an axis [-].
+# _ALONG_AXIS: smallest direction cosine of gravity with an axis while a load fades [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# _DAMPED: damping that takes at most this share of the momentum in a window is not suspected to be a load [-].
-# _LEFT: damping that takes more is a load if less than this share of the largest momentum remains [-].
+# _DAMPED: largest momentum loss in a window that is certainly due to damping, as a fraction of the momentum [-].
+# _LEFT: smallest remaining fraction of the largest momentum at which a greater loss is still due to damping [-].
 _DAMPED, _LEFT = 0.2, 0.05
-# Damping that takes more than this share of the momentum from each state to the next is a load [-].
+# Largest momentum loss between successive states that is due to damping, as a fraction of the momentum [-].
 _SHOWN = 0.1
-# Largest deviation of the momentum in a window without loads, as a share of its largest value and of its range [-].
+# Largest deviation of the momentum in a window without loads, as a fraction of its largest value and of its range [-].
 # A fading load that causes this deviation may change the momentum by twice as much over the window.
-# For a subset of the moving parts TOLERANCE is used instead, because the other parts of their body act on them.
+# For some of the moving parts, TOLERANCE is used instead, because the other parts of their body act on them.
 _ENOUGH = 3e-3
-# The next three limits are used to find gravity at right angles to a load of constant direction.
+# The three constants below are used to find gravity at right angles to a load of constant direction.
 # _REACH_OF_NOISE: largest deviation of the momentum at right angles to the load, in rounding errors [-].
 # _SEEN: smallest component at right angles to the load of an axis along which gravity may act [-].
 # _CLEARLY: smallest ratio of the deviation along the load to the deviation at right angles to it [-].
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# _FADED: a force fades if in the last third of a window it has at most this share of its size in the first third [-].
-# _LITTLE: at the end of a window a fading force is at most this share of the weight [-].
+# _FADED: largest force in the last third of a window, relative to the first third, of a force that fades [-].
+# _LITTLE: largest force at the end of a window, relative to the weight, of a force that fades [-].
 _FADED, _LITTLE = 0.6, 0.02
-# A motion is straight if the momentum perpendicular to its direction is at most this share of the momentum [-].
+# Largest momentum perpendicular to the direction of a straight motion, as a fraction of the momentum [-].
 _STRAIGHT = 0.01
-# A change of momentum is treated as zero if it is at most this many times the fitting error [-].
+# Largest change of momentum that is treated as zero, in multiples of the fitting error [-].
 _UNSEEN = 2.0
 # Relative error of the work of gravity that is computed from the states [-].
 _OF_WORK = 2e-3
-# A mass was written by the solver if it exceeds the lower bound from momenta and energies by this share [-].
+# Smallest relative excess of a mass written by the solver over the lower bound from momenta and energies [-].
 _CLEARLY_HEAVIER = 1e-6
-# Fewest states for a fit of work: twice the number of unknowns.
+# Smallest number of states for a fit of work; it is twice the number of unknowns.
 _LEAST_STATES = 6
 
 
 class Laws:
-    """Laws of free flight for one set of parts: only gravity and damping act, or nothing acts at all.
+    """Laws of free flight for one set of parts: only gravity and damping act, or no force at all.
 
     A constant net force does not prove gravity, and a push that fades exponentially looks like damping under such a
     force.  The force is accepted only if it is the mass times one of the deck's accelerations ``gravities`` (0: none
@@ -129,7 +129,7 @@ class Laws:
 
     @property
     def _carried(self) -> bool:
-        """Return True if a support must carry parts whose momentum shows no force."""
+        """Return True if parts without a visible force must be carried by a support."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -192,7 +192,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield possible weights (3,) along an axis, from the momentum at right angles to a steadily directed load."""
+        """Yield possible weights (3,) along an axis, from the momentum at right angles to a load of fixed direction."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -351,7 +351,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Return True if at some time the momentum component perpendicular to a load shows gravity."""
+        """Return True if the momentum perpendicular to a load shows gravity at some time."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
@@ -362,7 +362,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield the gravities close to an acceleration, from the ``known`` values or else from the usual ones."""
+    """Yield the gravities close to an acceleration, from the ``known`` values or else from the usual values."""
     if known is not None:
         yield from (
             gravity
@@ -446,7 +446,7 @@ class FreeFall(Law):
         self.integral = integrate_by_trapezia(time, momentum)
         self._both = np.asfortranarray(
             np.hstack([momentum, self.integral])
-        )  # Columns that are contiguous in memory are faster.
+        )  # Columns that are contiguous in memory are faster to process.
 
     def _misfit(self, first: int, last: int) -> float:
         if (

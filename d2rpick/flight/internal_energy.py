@@ -24,50 +24,50 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Share by which the energy band before td is widened, because it may not contain a complete vibration [-].
+# Fraction by which the energy band before td is widened [-], because it may not contain a complete vibration.
 _BAND_RESERVE: Final = 0.25
-# Share of the time before td that is not used for the energy band [-], because the load may still act in it.
+# Fraction of the time before td that is not used for the energy band [-], because the load may still act in it.
 # In 45 computed runs, the energy entered its band too early by up to 30 % of the time before td.
 _WAIT: Final = 1 / 3
-# _OUTER: the lowest and the highest energies with this share of all energies are outside of the usual range [-].
-# _LATEST: share of the time before td in which the usual rate of the energy is measured [-].
-# _FASTER: a contact changes the energy at least this many times as fast as the usual rate before td [-].
+# _OUTER: fraction of the lowest and of the highest energies that lie outside the usual range [-].
+# _LATEST: fraction of the time before td in which the usual rate of change of the energy is measured [-].
+# _FASTER: smallest ratio of the rate of change in a contact to the usual rate of change before td [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# The energy level is the mean energy over this share of the time without load [-].
-# The level has changed once this mean leaves the band of the means before td, widened by its width at both ends.
+# Fraction of the time without load over which the energy is averaged to obtain its level [-].
+# The level has changed once the mean energy leaves the band of the means before td, widened by its width at both ends.
 _LEVEL: Final = 1 / 8
-# _KNOWN: a landing is detected by comparison with this share of the time before the landing [-].
-# _TURNED: smallest number of turning points of the energy in the time with which a landing is compared.
+# _KNOWN: fraction of the time before a landing with which the landing is compared to be detected [-].
+# _TURNED: smallest number of energy extrema in the time with which a landing is compared.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Energies below this share of the largest energy are round-off [-], because files have about seven digits.
+# Largest energy that is treated as round-off, relative to the largest energy [-]; files have about seven digits.
 _ROUND_OFF: Final = 1e-6
 
-# The energies in a flight stay in the band of its last quarter, widened by this share of the band's width [-].
+# Widening of the energy band of a flight's last quarter such that it contains all its energies, in band widths [-].
 _RESERVE: Final = 0.5
-# The mean energies of the last two quarters of a flight differ by less than this share of the energy band [-].
-# A vibration with 3/4 of a period in each quarter changes these means by 30 % of the width of the energy band.
-# A steady drift changes these means by the width of the energy band.
+# Largest difference of the mean energies in the last two quarters of a flight, as a fraction of the energy band [-].
+# A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
+# A steady drift changes the mean energies of the two quarters by the width of the energy band.
 _DRIFT: Final = 0.35
-# A slow vibration swings at least this many times by at least half of its range; a crash swings fewer times.
+# Smallest number of oscillations over half of its range in a slow vibration; a crash has fewer.
 _SWINGS: Final = 4
-# In a slow vibration, the energy range in each half of a flight is at least this share of the total range [-].
+# Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75
-# _TO_ZERO: an energy that falls below this share of its peaks belongs to a single vibration [-].
-# _HARDLY: an oscillation of the energy below this share of the plastic energy is ignored [-].
+# _TO_ZERO: largest minimum of the energy of a single vibration, as a fraction of its peaks [-].
+# _HARDLY: largest oscillation of the energy that is ignored, as a fraction of the plastic energy [-].
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# _FLAT: a body yields in its first oscillation if its energy comes within this share of its later level [-].
-# _MOST_FLAT: longest time for which the energy stays near its minimum, as a share of the time in which it rises [-].
+# _FLAT: largest relative distance from its later level of the energy of a body that yields in its first swing [-].
+# _MOST_FLAT: longest time for which the energy stays near its minimum, as a fraction of the time in which it rises [-].
 # The energy of a harmonic motion stays near its minimum for 0.7 of its rise time.
 # The energy of a body that collides later stays near its minimum for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
-# Yielding is fed by kinetic energy, so the total energy rises by at most this share of the energy of yielding [-].
+# Largest rise of the total energy during yielding, which kinetic energy feeds, relative to the yielding energy [-].
 _NOT_FROM_MOTION: Final = 0.1
 
 
 class QuietTime(NamedTuple):
-    """A window in which the energy shows no load [time]; ``end`` is None if no later contact is seen.
+    """A window in which the energy shows no load [time]; ``end`` is None if the record shows no later contact.
 
     The window was found around ``td``.  ``settled`` is the time when the energy had settled; the time from there to
     ``start`` is left unused for safety.
@@ -80,7 +80,7 @@ class QuietTime(NamedTuple):
 
 
 def find_quiet_time(history: History, td: float) -> QuietTime | None:
-    """Find the window around ``td`` in which the energy keeps its level and its band; None if there is none [time]."""
+    """Find the window around ``td`` in which the energy keeps its level and its band [time]; None if there is none."""
     start = history.start
     after_td = int(np.searchsorted(history.time, td, side="right"))
     states = slice(0, after_td)
@@ -126,7 +126,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time after ``start`` at which the energy quickly leaves its former range [time], or None.
+    """Return the first time after ``start`` at which the energy quickly leaves its former range [time]; None if none.
 
     The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
     width: no vibration goes so far beyond its range of so long a time.
@@ -154,7 +154,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the last time before td at which the energy enters its band, as the end of the load [time].
+    """Return the last time before td at which the energy enters its band, as the end of the load [time]; None if none.
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
@@ -182,7 +182,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, states: slice) -> float | None:
-    """Return the time of the last of some states at which the energy is far from its usual values, or None."""
+    """Return the time of the last of some states at which the energy is far from its usual values; None if none."""
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
@@ -192,7 +192,7 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
 
 
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
-    """Return the time of the last of some states to which the energy changes much faster than usual, or None.
+    """Return the time of the last of some states to which the energy changes much faster than usual; None if none.
 
     Usual are the rates from the time ``latest`` on.
     """
@@ -207,26 +207,26 @@ def _find_last_push(history: History, states: slice, latest: float) -> float | N
 
 @remember
 def _compute_rates(history: History) -> Samples:
-    """Return how fast the energy changes between two states, shape (n - 1,) [energy/time]."""
+    """Return the rate of change of the energy between successive states, shape (n - 1,) [energy/time]."""
     return np.asarray(np.abs(np.diff(history.energy)) / np.diff(history.time))
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the energy leaves its band in these states, or None."""
+    """Return the first time after some states at which the energy leaves its band in these states; None if none."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None
 
 
 def _find_change_of_level(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the mean energy leaves the band of their means, or None."""
+    """Return the first time after some states at which the mean energy leaves the band of their means; None if none."""
     count = states.stop - states.start
     width = round(_LEVEL * count)
     if width < 1:
         return None
     sums = _sum_energies(history)[states.start :]
     means = (sums[width:] - sums[:-width]) / width
-    # The mean with the index ``count`` is the first one that is taken over later states only.
+    # The mean with the index ``count`` is the first mean taken over later states only.
     low, high = _widen_band(means[: count - width + 1], 1.0)
     outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
     if outside.size:
@@ -241,7 +241,7 @@ def _sum_energies(history: History) -> Samples:
 
 
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
-    """Return the band of some values, widened at both ends by a share of its width."""
+    """Return the band of some values, widened at both ends by a fraction of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 
@@ -356,7 +356,7 @@ def rises_as_it_yields(
 
 
 def _sum_later_losses(damped: Samples) -> Samples:
-    """Return the energy that damping takes from each state to the last quarter of a window, shape (n,)."""
+    """Return the energy that damping takes from each state to the last quarter of a window, shape (n,) [energy]."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
@@ -401,7 +401,7 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
 
 
 def _count_large_swings(energy: Samples, least: float) -> int:
-    """Count how often an energy turns after a change of at least ``least``."""
+    """Count the extrema of an energy after changes of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns = 0
     low = energy[0]

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Smallest margin, as a share of the flight [-].
+# Smallest margin, as a fraction of the flight [-].
 # In 36 computed OpenRadioss runs, switching moved the landing by up to 2.5 % of the flight.
 LEAST_MARGIN: Final = 0.03
-# A momentum that changes by less than this share in a flight is constant except for rounding [-].
+# Largest relative change of a momentum in a flight that is treated as rounding [-].
 _ROUNDING: Final = 1e-5
-# A force is determined only from at least this number of states.
+# Smallest number of states needed to determine a force.
 _FEWEST: Final = 3
 # A small position error can move a grazing contact, in which surfaces slide along each other, to a much earlier time.
-# _GRAZING_FORCE: a contact grazes the body if its force stays below this share of the largest force on the body [-].
-# _GRAZING_MOMENTUM: a contact also grazes the body if it changes less than this share of the approach momentum [-].
+# _GRAZING_FORCE: largest force of a contact that grazes the body, as a fraction of the largest force on the body [-].
+# _GRAZING_MOMENTUM: largest momentum change in a grazing contact, as a fraction of the approach momentum [-].
 # A landing takes at least 25 % of the momentum in theory, and took at least 27 % in computed runs of cars and boxes.
 # The grazing contact of a computed car took 2 % of the momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
@@ -97,7 +97,7 @@ def estimate_landing_spread(
     place: float | None,
     turning: float | None = None,
 ) -> float | None:
-    """Return how far a switch may move the next landing, by its velocity error and its position error [time].
+    """Return how far a switch may shift the next landing, by its velocity error and its position error [time].
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
@@ -222,7 +222,7 @@ def changes_momentum_little(history: History, flight: Flight) -> bool:
 
 
 def estimate_spread_of_vibration(history: History, flight: Flight) -> float | None:
-    r"""Return by how much time the velocity error of a switch may move the next landing [time].
+    r"""Return the time by which the velocity error of a switch may shift the next landing [time].
 
     A switch takes the velocity of the vibration from all parts, and freezes them away from their rest positions, by the
     amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass moves on as before, so that a
@@ -300,7 +300,7 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
 
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
-    """Return the momentum of the flying parts, shape (k, 3 or 1); None if unknown or other parts move too."""
+    """Return the momentum of the flying parts, shape (k, 3 or 1); None if it is unknown or other parts move too."""
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -317,7 +317,7 @@ def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
 def select_momenta_of_flight(
     history: History, flight: Flight
 ) -> tuple[Momenta, Sequence[int]] | None:
-    """Return the momenta that show the flying parts, and their columns; None if none is written."""
+    """Return the momenta that show the flying parts, and the columns of these parts; None if no momenta are written."""
     for momenta in history.momenta:
         if (momenta.parts is None) != (flight.parts is None):
             continue
@@ -329,7 +329,7 @@ def select_momenta_of_flight(
 
 
 def find_direction_of_approach(history: History, flight: Flight) -> Samples | None:
-    """Return the unit vector (3,) of gravity in a flight; if there is no gravity, that of the motion.
+    """Return the unit vector (3,) of gravity in a flight or, without gravity, of the motion.
 
     None if the momentum is not written, or nothing moves.
     """
@@ -343,7 +343,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 
 
 def compute_closing_speed(history: History, flight: Flight) -> float | None:
-    """Return the speed along gravity at the end of a flight, negative for a body that rises [length/time].
+    """Return the speed along gravity at the end of a flight [length/time], which is negative for a body that rises.
 
     If there is no gravity, the result is the whole speed.  None if the momentum or the mass is unknown.
     """
@@ -362,7 +362,7 @@ def compute_closing_speed(history: History, flight: Flight) -> float | None:
 
 
 def _compute_share_towards_ground(momentum: Samples) -> float:
-    """Return the share of the final kinetic energy that belongs to motion along gravity [-]."""
+    """Return the fraction of the final kinetic energy that belongs to motion along gravity [-]."""
     direction = _find_direction_of_change(momentum)
     if direction is None or not momentum[-1].any():
         return 0.0 if momentum.any() else 1.0

@@ -35,26 +35,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A momentum is constant if its relative change is below this [-], because single precision has seven digits.
+# Largest relative change of a constant momentum [-]; single precision has seven digits.
 _CONSTANT = 1e-6
-# A momentum, or its change, shows motion only if it exceeds its rounding error by this factor [-].
+# Smallest ratio of a momentum, or of its change, to its rounding error at which it shows motion [-].
 _VISIBLE = 100
-# A larger set of parts is preferred only if its window is longer by this factor [-].
-# A part with a large momentum, such as a sled, increases the tolerance and the length of the windows of all parts.
+# Smallest ratio of window lengths at which a larger set of parts is preferred [-].
+# A part with a large momentum, such as a sled, increases the tolerance and the window lengths of all parts.
 _LONGER = 1.1
-# _LOOK_BACK: attached parts are determined in this share of the record before td [-].
+# _LOOK_BACK: fraction of the record before td in which attached parts are determined [-].
 # _LOOK_STATES: largest number of states from which attached parts are determined.
-# _CANCELS: the sum of the momenta of a body deviates from a straight line by less than this share [-].
+# _CANCELS: largest relative deviation from a straight line of the sum of the momenta of a body [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# A decrease of the summed deviation by less than this share is treated as rounding error [-].
-# This limit keeps the search from endlessly adding and removing a part of almost no mass.
+# Largest relative decrease of the summed deviation that is treated as rounding error [-].
+# The limit prevents the search from endlessly adding and removing a part of almost no mass.
 _ROUNDED: Final = 1e-9
-# A set of parts is at rest or held if its final speed is below this share of its largest momentum.
+# Largest final speed of parts at rest or held by a support, as a fraction of their largest momentum [-].
 _HELD = 0.01
-# The part momenta add up to the model's momentum within this share, unless a rigid body has absorbed some parts.
+# Largest relative difference between the summed part momenta and the momentum of the model, if no part is missing [-].
 _ALL_OF_IT: Final = 1e-2
-# _BY_ITSELF: a separate flight of a body counts if it lasts for at least this share of the record [-].
-# _OF_ITS_OWN: a body flies separately if its velocity differs from that of the others by at least this share [-].
+# _BY_ITSELF: smallest duration of a separate flight of a body that is considered, as a fraction of the record [-].
+# _OF_ITS_OWN: smallest relative velocity difference between a body that flies separately and the other parts [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 FLYING: Final = "flying"
@@ -62,7 +62,7 @@ ALL: Final = "all"
 
 
 def select_momenta_for_flight(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
-    """Return the momenta that may show a flight, best first; if a set of flying parts is named, only its momenta."""
+    """Return the momenta that may show a flight, best first; if the user names the flying parts, only their momenta."""
     return [candidate for candidate in momenta if candidate.flying] or momenta
 
 
@@ -210,7 +210,7 @@ def find_flight_of(
     ):
         steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
-            return None  # The parts are held, or they are at rest.
+            return None  # The parts are held by supports, or they are at rest.
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     flight = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return limit_to_unheld(momenta.surroundings, flight, parts, td)
@@ -237,7 +237,7 @@ def _make_laws(
 
 @remember
 def _has_falling_part(momenta: Momenta) -> bool:
-    """Return True if a single part is seen to fall under gravity."""
+    """Return True if the momentum of a single part shows that it falls under gravity."""
     if momenta.parts is None:
         return False
     return any(get_laws_of(momenta, (i,)).fall for i in momenta.moving)
@@ -246,7 +246,7 @@ def _has_falling_part(momenta: Momenta) -> bool:
 def find_all_flights(
     momenta: Momenta, balance: Balance | None = None
 ) -> tuple[FreeFlight, ...]:
-    """Find all free flights of the chosen parts and the parts that fly with them, in ascending order."""
+    """Find all free flights of the chosen parts and of the parts that fly with them, in ascending order."""
     return find_all_windows(
         momenta.time, partial(find_flight_around, momenta, balance=balance)
     )
@@ -431,7 +431,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at different times, without the parts that slide then.
+    """Yield the sets of parts attached to the heaviest part at different times, without the parts that then slide.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
@@ -523,7 +523,7 @@ def find_complete_stretches(
 def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return for each state whether the part momenta add up to the momentum of the whole model, shape (n,).
+    """Return True for each state in which the part momenta add up to the momentum of the whole model, shape (n,).
 
     ``before`` is the largest momentum of the whole model in earlier states.
     """

@@ -1,7 +1,7 @@
-"""Compute the position error of a body at td that arises because moving parts were frozen in another position.
+"""Compute the position error of a body at td that is caused by moving parts frozen in another position.
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
-flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
+flies as without switching, so the rest of the body is displaced by the part's fraction of the mass times the part's
 relative displacement from tr to td, in the frame that turns with the body (docs/explanation/position-error.md).
 Displacements come from the velocities of the parts, their momenta over their masses.
 
@@ -38,16 +38,16 @@ if TYPE_CHECKING:
 
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# A part is not connected to the body if its relative velocity changes by less than this share [-].
-# The relative velocity of a connected part exceeds this limit as soon as the body rotates by 0.01 degrees.
+# Largest relative change of its relative velocity for a part that is not connected to the body [-].
+# The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
 _STEADY: Final = 1e-4
-# A position error is a lower bound if the other parts deform by more than this share of the part's motion [-].
+# Largest deformation of the other parts, relative to the part's motion, at which a position error is exact [-].
 # In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
 # In a public car model with position errors that were 3 to 4 times too small, the deformation was 1.1 to 1.4 of it.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Position errors below this share of the largest acceptable error are negligible, even if underestimated [-].
+# Largest negligible position error, even if underestimated, as a fraction of the largest acceptable error [-].
 _HARDLY: Final = 0.01
-# Largest acceptable position error as a share of the path of the body [-]; it is 1/3 of the margin before a contact.
+# Largest acceptable position error as a fraction of the path of the body [-]; it is 1/3 of the margin before a contact.
 MOST_OF_PATH: Final = 0.01
 
 
@@ -92,7 +92,7 @@ class Drift:
         """Return True if errors and angles are lower bounds, because internal motion looks like motion of the body.
 
         This happens if the part moves slowly, or if the motion of the others turns their frame by more than
-        the body's own angle, or, if there is no deck, moves them by a notable share of the part's motion.
+        the body's own angle, or, if there is no deck, moves them by a notable fraction of the part's motion.
         """
         moved = float(
             np.sqrt(
@@ -107,7 +107,7 @@ class Drift:
         return self.turning.doubt > float(np.sqrt(np.mean(angles**2)))
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Return the position errors of the body at td, for tr (k,) [length]; NaN outside the flight.
+        """Return the position errors of the body at td for tr (k,) [length]; NaN outside the flight.
 
         If the deck shows how the body turns, the largest distance at the watched nodes is used, else that of the centre
         of mass.
@@ -121,7 +121,7 @@ class Drift:
         return self._inside(tr, td, place_at_td[:-1] - place_at_td[-1])
 
     def errors_at_contact(self, tr: Samples, direction: Samples | None) -> Samples:
-        """Return the position errors at the contact that ends the flight, for tr (k,) [length]; NaN outside the flight.
+        """Return the position errors at the contact that ends the flight for tr (k,) [length]; NaN outside the flight.
 
         With a unit vector (3,) towards the contact, the errors of the node that touches first count if they are larger.
         """
@@ -132,7 +132,7 @@ class Drift:
         return np.maximum(errors, self.turning.errors_at_front(tr, direction))
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """Return the rotation errors of the body at td, for tr (k,) [degrees]; NaN if unknown."""
+        """Return the rotation errors of the body at td for tr (k,) [degrees]; NaN if unknown."""
         if self.turning is None:
             turned = np.full((tr.size, 3), np.nan)
         else:
@@ -140,7 +140,7 @@ class Drift:
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
-        """Return the length of each vector (k, 3), and NaN for times outside the flight."""
+        """Return the length of each vector (k, 3), or NaN for times outside the flight."""
         inside = (
             (tr >= self.time[0])
             & (tr <= self.time[-1])
@@ -200,7 +200,7 @@ def find_drift(
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # Parts with unknown position are left out, because the error would be too small otherwise.
+    )  # Parts with unknown position are left out, because the error would otherwise be too small.
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -329,7 +329,7 @@ def _collect_flying(
 
 
 class RigidBody(NamedTuple):
-    """Ids of the parts that become one rigid body; ``whole`` is False for a single part with loose pieces.
+    """Ids of the parts that become one rigid body; ``whole`` is False for a single part with disconnected pieces.
 
     No file shows how such pieces move against each other.
     """
@@ -363,7 +363,7 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies in a flight with their displacements; if ``told``, the bodies of the deck, is empty, one is assumed.
+    """Rigid bodies in a flight with their displacements; a single body is assumed if the deck defines none (``told``).
 
     If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
     to become one body with others but fly away from them.
@@ -385,7 +385,7 @@ class Bodies:
         )
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Return the position error of the most displaced body at td, for tr (k,) [length]; NaN outside the flight."""
+        """Return the position error of the most displaced body at td for tr (k,) [length]; NaN outside the flight."""
         if self._complete:
             return np.asarray(self._each(tr, td).max(axis=0))
         return np.full(tr.shape, np.nan)
@@ -413,7 +413,7 @@ class Bodies:
         )
 
     def compute_speed_at_front(self, direction: Samples) -> float | None:
-        """Return the speed along a unit vector (3,) that the rotation adds at the point of a body farthest along it.
+        """Return the speed along a unit vector (3,) that rotation adds at the point of a body farthest along it.
 
         Of several bodies the least counts [length/time]; None if a deck does not show how each of them turns.
         """

@@ -21,37 +21,37 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A rotation is accepted if it leaves less than this share of the displacements unexplained [-].
+# Largest fraction of the displacements that a rotation may leave unexplained to be accepted [-].
 _SHOWN: Final = 0.25
 # Largest number of Gauss-Newton steps; a dozen steps reach full precision from a good start.
 _MOST_STEPS: Final = 25
-# _SMALL: step for the numerical derivative by the rate of rotation, as a share of one revolution per record [-].
-# _LEAST_GAIN: the iteration stops if the rate or the fit changes by less than this share [-].
+# _SMALL: step of the numerical derivative by the angular velocity, in revolutions per record [-].
+# _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# A rotation about an axis cannot be determined if the squared lever arms about it are below this share of the others.
+# Smallest squared lever arms about an axis whose rotation can be found, as a fraction of those about the others [-].
 _ALONG_AXIS: Final = 1e-6
 # Numbers of periods per record that are tried as start values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 # Number of parts that each of two criteria selects as candidates for the next moving part.
 _TRIED: Final = 2
-# A part is the next moving part if leaving it out reduces the unexplained displacement to this share or less.
+# Largest ratio to which omitting the next moving part reduces the unexplained displacement [-].
 _MORE_RIGID: Final = 0.5
-# An unexplained sum of m r^2 below this share of the sum of m r^2 is ignored [-].
+# Largest unexplained sum of m r^2 that is ignored, as a fraction of the sum of m r^2 [-].
 _NOTHING: Final = 1e-6
-# A rotation is ignored if it moves the other parts by less than this share of the moving part's motion [-].
+# Largest motion of the other parts in a rotation that is ignored, relative to the moving part's motion [-].
 _NOTABLE_WAY: Final = 0.1
-# The rotation of a body is unknown if a single part has more than this share of its mass.
+# Largest mass fraction of a single part at which the rotation of the body can be determined [-].
 _MOST_OF_BODY: Final = 0.95
-# Parts with less than this share of the mass are not tried, because they hardly move the others.
+# Smallest mass fraction of the parts that are tried [-], because lighter parts hardly move the others.
 _HEAVY: Final = 0.05
 
 
 def _fit_steady_rotation(
     time: Samples, ways: Samples, masses: Samples, least: float
 ) -> tuple[Samples, float]:
-    """Fit the constant rate of rotation that best explains how a body's parts are displaced about its centre.
+    """Fit the constant angular velocity that best explains how the parts of a body are displaced about its centre.
 
     Parameters
     ----------
@@ -222,12 +222,12 @@ def _list_linear_terms(
 def _compute_rest(
     time: Samples, ways: Samples, rate: Samples, weights: Samples
 ) -> Samples:
-    """Return the sum of m r^2 that a rotation at ``rate`` does not explain."""
+    """Return the sum of m r^2 that a rotation at the angular velocity ``rate`` does not explain."""
     return np.asarray(weights * subtract_circles(time, ways, rate))
 
 
 def _rotate_frame(time: Samples, rate: Samples) -> Samples:
-    """Return the axes (n, 3, 3) of a frame that rotates at ``rate``; a row vector times the axes is in that frame."""
+    """Return the axes (n, 3, 3) of a frame that rotates at ``rate``; they transform row vectors into this frame."""
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
@@ -302,7 +302,7 @@ def _find_next_moving_part(
 def _leave_part_out(
     time: Samples, ways: Samples, mass: Samples, left: Places, part: int
 ) -> _Apart:
-    """Leave one part out and fit the rotation of the others."""
+    """Leave one part out, and fit the rotation of the others."""
     remaining = left[left != part]
     path_of_part = (
         ways[:, [part]]
@@ -328,7 +328,7 @@ def _leave_part_out(
 
 
 def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
-    """Return displacements from the centre of mass."""
+    """Return displacements relative to the centre of mass."""
     return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
 
 
@@ -342,7 +342,7 @@ def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
 
 
 def has_clear_rotation(mass: Samples) -> bool:
-    """Return True if the rotation of the body is still found when any one of its heavy parts is left out."""
+    """Return True if the rotation of the body is still found when any one of its heavy parts is omitted."""
     if mass.size < 3:
         return False
     columns = np.arange(mass.size)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 # Largest number of states in the integration, which suffices because vibration hardly rotates a body.
 _STATES: Final = 2000
-# The final angular velocity is the mean over 1 / _LAST of the flight, so that vibration is averaged out.
+# Inverse of the fraction of the flight over which the final angular velocity is averaged, to remove vibration [-].
 _LAST: Final = 10
 
 
@@ -68,7 +68,7 @@ class Turning(NamedTuple):
     rate: Samples
 
     def compute_speed_at_front(self, direction: Samples) -> float:
-        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along it.
+        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along the vector.
 
         That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
         one [length/time].
@@ -106,14 +106,14 @@ class Turning(NamedTuple):
         )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body's frame [length]."""
+        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body frame [length]."""
         arm = _interpolate_at(self.time, self.arm, np.array([td]))
         return np.asarray(
             self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)
         )
 
     def _compute_slides(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) from ``tr`` to td, except those by rotation, in the body's frame [length]."""
+        """Return the displacements (k, 3) from ``tr`` to td without the part due to rotation, in the body frame."""
         at_td = _interpolate_at(self.time, self.place, np.array([td]))
         return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
 
@@ -202,7 +202,7 @@ def follow_turning(
     )
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # This is the centre of the parts according to the deck [length].
+    )  # Centre of the parts according to the deck [length].
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
     nodes = (nodes - home + middle[-1]) @ frames[-1].T
@@ -222,7 +222,7 @@ def follow_turning(
 def _integrate_velocities(
     momenta: Momenta, members: Sequence[int], mass: Samples
 ) -> Samples:
-    """Return how far the parts in these columns have moved since the run began, (n, parts, 3) [length].
+    """Return how far the parts in these columns have moved since the run began, shape (n, parts, 3) [length].
 
     The velocity before the first state is the one of that state.
     """
@@ -233,7 +233,7 @@ def _integrate_velocities(
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
-    """Return the places (n, parts, 3) of parts in a record that begins in the run, up to a displacement of all.
+    """Return the positions (n, parts, 3) of parts in a record within the run, up to a common displacement.
 
     Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
     the frame of the body: a part that vibrates on its mounts does so about its place.
@@ -255,7 +255,7 @@ def _solve_turning(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of the rotation error psi: return propagation matrix, particular solution, effect of I(tr)."""
+    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = (
         np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))
@@ -263,8 +263,8 @@ def _solve_turning(
     )
     kept_rate = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # This is the angular momentum in the fixed frame of reference.
-    # This is the angular momentum in the frame of the body.
+    )  # Angular momentum in the fixed frame of reference.
+    # Angular momentum in the frame of the body.
     momentum = kept_rate @ frames
     light = np.linalg.inv(inertia.mean(axis=0))
     rate = momentum @ light
@@ -300,7 +300,7 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 
 
 def _compute_turns(frames: Samples) -> Samples:
-    """Return the rotation from each frame to the next, (n - 1, 3) [rad], for small angles."""
+    """Return the rotation from each frame to the next, shape (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
     odd = (between - between.transpose(0, 2, 1)) / 2
     sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
@@ -341,7 +341,7 @@ def _sum_running(steps: Samples) -> Samples:
 
 
 def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
-    """Return values (n, ...) at times (k,), linear between samples."""
+    """Return values (n, ...) at times (k,), interpolated linearly."""
     next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     share = (when - time[next_state - 1]) / (time[next_state] - time[next_state - 1])
     share = share.reshape(-1, *[1] * (values.ndim - 1))

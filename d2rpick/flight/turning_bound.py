@@ -47,7 +47,7 @@ def bound_turning_speed(
 
 
 def may_turn_back(history: History, flight: Flight) -> bool:
-    """Return True if the energy of the rotation may move parts away from the ground as fast as the body approaches it.
+    """Return True if the rotational energy may move parts away from the ground as fast as the body approaches it.
 
     Parts at the radius of gyration then have the speed of the centre of mass; those outside are faster.  False if the
     files do not show it.
@@ -62,7 +62,7 @@ def may_turn_back(history: History, flight: Flight) -> bool:
 
 
 def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:
-    """Return an upper bound of the energy of the rotation in a flight [energy]; None if masses or energies are unknown.
+    """Return an upper bound on the rotational energy in a flight [energy]; None if masses or energies are unknown.
 
     If only the kinetic energy of the model is written it serves, since that of the flying parts is not larger.
     """

@@ -1,4 +1,4 @@
-"""Find the parts that vibrate with the chosen ones in a flight, and their kinetic energy."""
+"""Find the parts that vibrate together with the chosen parts in a flight, and their kinetic energy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Other parts vibrate too if their energy varies by more than this share of the energy range of the chosen parts [-].
+# Smallest energy variation of other vibrating parts, as a fraction of the energy range of the chosen parts [-].
 _HARDLY: Final = 0.02
 # Smallest number of states from which a fall and a vibration can be separated.
 _FEWEST: Final = 16
@@ -28,7 +28,7 @@ class Beside(NamedTuple):
 
 
 def find_vibrating_parts(history: History, flight: Flight) -> Beside:
-    """Find the parts that vibrate with the chosen ones but were not chosen.
+    """Find the parts that vibrate together with the chosen parts, but were not chosen.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
 def extract_kinetic_energy(
     history: History, flight: Flight
 ) -> tuple[Samples, Samples] | None:
-    """Return the kinetic energy of all parts that vibrate together in the flight, without that of their fall.
+    """Return the kinetic energy of all parts that vibrate together in the flight, without the energy of their fall.
 
     Parameters
     ----------

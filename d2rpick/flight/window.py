@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# Initial tolerance for deviations from free flight, as a share of the range over the record [-].
-# A contact exceeds this tolerance at once.
+# Initial tolerance for deviations from free flight, as a fraction of the range over the record [-].
+# A contact exceeds the initial tolerance at once.
 TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
-# If the tolerance is reduced, windows of other smooth motions shrink to less than half, but not those of flights.
-# _STAYS: share of its length that a window must retain to count as unchanged [-].
-# _STANDS: a window shrinks at one end only if its other end moves by at most this share of the length [-].
+# With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
+# _STAYS: smallest fraction of its length that a window retains if it is treated as unchanged [-].
+# _STANDS: largest shift of the unchanged end of a window that shrinks at its other end, as a fraction of it [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# The misfit of a vibration in the middle half of a window is at least this share of that in the window [-].
-# For a smooth load, this share is 1/8.
+# Smallest misfit of a vibration in the middle half of a window, as a fraction of the misfit in the whole window [-].
+# For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.
 _RINGS = 1 / 3
-# SHORTEST: a flight lasts for at least this share of the record [-].
-# FEWEST: a flight has at least this number of states.
+# SHORTEST: smallest duration of a flight, as a fraction of the record [-].
+# FEWEST: smallest number of states in a flight.
 SHORTEST, FEWEST = 0.05, 12
-# _ENDS: share of a window at each end that is not used to determine the misfit of the free flight itself [-].
+# _ENDS: fraction of a window at each end that is not used to determine the misfit of the free flight itself [-].
 # _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger if the ends are included [-].
 # _REACH: factor by which any other misfit may be larger if the ends are included [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of any quantity [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
-# The search for long flights starts from every fifth of the times that find all flights.
+# Step in the list of start times that find all flights, for a search that only needs to find long flights.
 _FAR: Final = 5
 # Largest number of times that the ends of one window are cut off.
 _MOST_SHRINKS = 8
@@ -75,7 +75,7 @@ class FreeFlight(NamedTuple):
 
 
 class Law:
-    """A law of free flight over ``time`` (n,), and the deviation of a record from it.
+    """A law of free flight over ``time`` (n,), and the deviation of a record from this law.
 
     The misfit of each window is computed once: neighbouring times ask for the same windows.
     """
@@ -103,7 +103,7 @@ class Constant(Law):
         super().__init__(time)
         self.values = np.asfortranarray(
             values
-        )  # Columns that are contiguous in memory are faster.
+        )  # Columns that are contiguous in memory are faster to process.
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -131,7 +131,7 @@ def find_lasting_window(
     fades : bool
         Continue to finer limits, because a smoothly fading load is visible only at these.
     enough : float
-        Share of the range that a window may leave although it still shrinks.
+        Fraction of the range that a window may leave although it still shrinks.
     rings : bool
         Accept a window whose misfit is as large in its middle, as that of a vibration is.
 
@@ -226,7 +226,7 @@ def _is_ringing(law: Law, window: tuple[int, int]) -> bool:
 
 
 def _is_fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
-    """Return True if a window shrinks only at the end of a fading load; the other end is a contact."""
+    """Return True if a window shrinks only at the end with a fading load; the other end is a contact."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 

@@ -21,32 +21,32 @@ if TYPE_CHECKING:
 
 
 # Smallest number of states from which a load, gravity and damping can be separated.
-# This is twice the number of unknowns.
+# This number of states is twice the number of unknowns.
 FEWEST_STATES: Final = 6
-# Relative error of the work of gravity, caused by sampling and by the sums of the solver.
-# A contact changes the work by more than the relative error of the work of gravity.
+# Relative error of the work of gravity, caused by sampling and by the sums of the solver [-].
+# Contacts are found because they change the energies by more than this fraction of the work of gravity.
 _OWN_ERROR: Final = 1e-3
 # Relative deviation of the work of gravity from a parabola that is attributed to damping [-].
 _BENT: Final = 1e-2
-# States whose squared speed is below this share of the largest are not used to compute the mass [-].
+# Smallest squared speed of states that are used to compute the mass, as a fraction of the largest [-].
 _SLOW: Final = 1e-2
-# Safety factor on the mass that follows from kinetic energy and velocity [-].
+# Safety factor on the mass that is computed from kinetic energy and velocity [-].
 # The mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
 # A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
-# Deviations below this share of the range of the internal energy show no work [-].
+# Largest deviation that shows no work, as a fraction of the range of the internal energy [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in multiples of the relative error of a printed number [-].
+# Error of a sum of energies minus the work of gravity, in multiples of the relative rounding error of a number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
-# _LITTLE: losses of kinetic energy below this share of it are ignored [-].
-# _MUCH: losses of kinetic energy above this share of it are due to friction, not damping [-].
+# _LITTLE: largest relative loss of kinetic energy that is ignored [-].
+# _MUCH: smallest relative loss of kinetic energy that is due to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
-# Relative error of the damped energy if it is computed from the damping rate of the vibration.
+# Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
 _RATE_ERROR: Final = 0.02
 
-# A contact energy shows no contact if it varies by less than this many times its rounding error.
+# Largest variation of a contact energy that shows no contact, in multiples of its rounding error [-].
 _VISIBLE = 100
 
 
@@ -91,7 +91,7 @@ def compute_work_beyond_gravity(
 
 
 def _bound_work_of_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Return an upper bound of the mass, which limits the work of gravity, from kinetic energy and velocity."""
+    """Return an upper bound on the mass, from kinetic energy and velocity; it limits the work of gravity."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     if fast.any():
@@ -143,7 +143,7 @@ def has_laws(balance: Balance) -> bool:
 def compute_change_of_balance(
     balance: Balance, start: float, end: float
 ) -> float | None:
-    """Return the largest change in kinetic plus internal energy that gravity and damping do not explain.
+    """Return the largest change of kinetic plus internal energy that gravity and damping do not explain [energy].
 
     Errors of digits are subtracted.  None if one of the energies is not written.
     """
@@ -301,7 +301,7 @@ def is_taken_by_damping(
 
 
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
-    """Return gravity in a window: 0 if energies are constant or only damped, else unknown.
+    """Return gravity in a window: 0 if the energies are constant or only damped, otherwise unknown.
 
     NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
     shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
@@ -354,7 +354,7 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Law that energies are parabolas of time, apart from damping, which takes a share of the kinetic energy.
+    """Law that energies are parabolas of time, apart from damping, which takes a fraction of the kinetic energy.
 
     Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """
@@ -410,7 +410,7 @@ def _make_law_of_contacts(balance: Balance) -> Constant:
 
 
 def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which the contact energy is constant, or None.
+    """Find the window around ``td`` [time] in which the contact energy is constant; None if there is none.
 
     If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
     counts only if the external work, which shows that load, is written too.

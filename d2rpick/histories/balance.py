@@ -1,4 +1,4 @@
-"""Read the energy balance of a run; each solver uses other names for its terms."""
+"""Read the energy balance of a run; the names of the energies depend on the solver."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# Names of a total energy of Abaqus: the sum of all energies minus the external work, which is constant.
+# Names of a total energy in Abaqus: the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
-# The health of a run can be judged if at least one of these quantities is written.
+# The health of a run can be judged if the files contain at least one of these quantities.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
     "kinetic_energy",
     "frictional_contact_energy",
@@ -52,16 +52,16 @@ _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
 # Normalised names of the spring energy in Radioss, in LS-DYNA's glstat, and in the glstat branch of a binout.
-# In tables, the names of spring energies may have another meaning.
+# Spring energies are recognised in solver files only, because in tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Largest spring energy that is treated as zero, as a share of the peak internal energy.
-# The limit corresponds to the six to seven digits of a glstat and of single precision.
+# Largest spring energy that is treated as zero, as a fraction of the peak internal energy [-].
+# The limit for spring energies corresponds to the six to seven digits of a glstat and of single precision.
 _NONE: Final = 1e-6
 # Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
-# Tolerance of the sum of the spring energies of parts, as a share of the peak; matsum prints five digits.
+# Tolerance of the sum of the part spring energies, as a fraction of its peak [-]; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
-# Smallest fitted factor with which the energy of a part belongs to a sum; ideal factors are 0 and 1.
+# Smallest fitted factor at which the energy of a part belongs to the sum [-]; ideal factors are 0 and 1.
 _HALF: Final = 0.5
 
 
@@ -88,7 +88,7 @@ def read_balance(
 
 
 def read_terms(databases: Sequence[Legs]) -> Balance | None:
-    """Return the energy balance of the whole model, even if it is too incomplete to judge the run.
+    """Return the energy balance of the whole model, even if it is too incomplete for judging the run.
 
     The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
@@ -99,7 +99,7 @@ def read_terms(databases: Sequence[Legs]) -> Balance | None:
 
 
 def read_momentum(database: Legs) -> Momenta | None:
-    """Return the momentum of the model, or its velocity if the mass is unknown; None if the files have neither."""
+    """Return the momentum of the model, or its velocity if the mass is unknown; None if the files contain neither."""
     has_components = not {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities)
     if not has_components and not _find_global_velocities(database):
         return None
@@ -125,7 +125,7 @@ def read_momentum(database: Legs) -> Momenta | None:
 
 
 def compute_least_masses(momenta: Samples, kinetic: Samples) -> Samples:
-    """Return the smallest masses (k,) that are possible for these momenta (n, k, 3) and kinetic energies (n, k)."""
+    """Return the smallest masses (k,) that are consistent with these momenta (n, k, 3) and kinetic energies (n, k)."""
     squares = np.sum(momenta**2, axis=2)
     masses = np.divide(
         squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0
@@ -134,12 +134,12 @@ def compute_least_masses(momenta: Samples, kinetic: Samples) -> Samples:
 
 
 def _find_whole_model(databases: Sequence[Legs]) -> Legs | None:
-    """Return the first database of the whole model."""
+    """Return the first database that describes the whole model."""
     return next((database for database in databases if database.channels), None)
 
 
 def _read_terms_until(whole: Legs, until: float) -> Balance | None:
-    """Return the terms of the balance up to a time; None if the time or the columns cannot be read."""
+    """Return the energies of the balance up to a time; None if the time or the columns cannot be read."""
     columns = give_if_written(
         lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     )
@@ -167,13 +167,13 @@ def _read_terms_until(whole: Legs, until: float) -> Balance | None:
 
 
 def _find_global_velocities(database: Legs) -> dict[str, str]:
-    """Return the channels with the name of a velocity of the whole model, by their normalised names."""
+    """Return the channels whose names denote a velocity of the whole model, keyed by normalised name."""
     names = {normalise_name(name): name for name in reversed(database.channels)}
     return {name: names[name] for name in _GLOBAL_VELOCITIES if name in names}
 
 
 class _Columns:
-    """The columns of a database by the quantities that they contain, for its first ``states`` states.
+    """The columns of a database keyed by the quantities that they contain, for the first ``states`` states.
 
     A column that is missing, or not in every state, is None.
     """
@@ -182,11 +182,11 @@ class _Columns:
         self._database = database
         self.states = states
         self.used: list[str] = []
-        # True if the momentum of the model is read, because its velocity is not written.
+        # True if the momentum of the model is read because its velocity is missing.
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model as written; else the smallest mass possible for these momenta (n, 1, 3)."""
+        """Return the mass of the model as written, or else the smallest mass possible for these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -196,7 +196,7 @@ class _Columns:
         return float(compute_least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def quantity(self, quantity: str) -> Samples | None:
-        """Return the column that contains a quantity of `d2rpick.histories.names.QUANTITIES`."""
+        """Return the column that contains a given quantity of `d2rpick.histories.names.QUANTITIES`."""
         name = self._database.quantities.get(quantity)
         return None if name is None else self._values(name)
 
@@ -213,7 +213,7 @@ class _Columns:
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
-        """Return the velocity of the centre of mass, shape (n, 3); a constant factor may be unknown.
+        """Return the velocity of the centre of mass, shape (n, 3), possibly scaled by an unknown constant factor.
 
         A global velocity is preferred, then a momentum, then any other velocity. A planar one has two of the three
         components.
@@ -228,7 +228,7 @@ class _Columns:
         return stacked
 
     def internal(self) -> Samples | None:
-        """Return the internal energy of the model, preferably from a column named as a total.
+        """Return the internal energy of the model, preferably from a column whose name contains "total".
 
         Other columns may belong to only some of the parts.
         """
@@ -239,7 +239,7 @@ class _Columns:
         return None
 
     def _values(self, name: str) -> Samples | None:
-        """Return a column; None if it is missing, or not all of its values are finite."""
+        """Return a column; None if the column is missing, or if some of its values are not finite."""
         values = give_if_written(lambda: self._database.channel(name)[: self.states])
         if values is None or not np.isfinite(values).all():
             return None
@@ -261,7 +261,7 @@ def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
 def _read_hourglass_energies(
     databases: Sequence[Legs], parts: Sequence[Part], until: float
 ) -> tuple[tuple[Part, float, float], ...]:
-    """Return the highest hourglass and internal energy of each part, if they are written."""
+    """Return the highest hourglass energy and internal energy of each part for which the files contain both."""
     ids = [part.id for part in parts]
     for database in databases:
         try:
@@ -281,7 +281,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return the name and values (n,) of the spring and damper energy; None if it is zero or makes up all energy."""
+    """Return name and values (n,) of the spring and damper energy; None if it is zero or makes up all of the energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
@@ -309,7 +309,7 @@ def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
 def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies add up to the energy of springs and dampers; () if there are none.
+    """Return the parts whose energies add up to the energy of springs and dampers; empty if there are no such parts.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """

@@ -1,4 +1,4 @@
-"""Read the forces of contacts and rigid walls, and the states between which they act.
+"""Read the forces of contacts and rigid walls, and the intervals between states in which they act.
 
 A solver writes exactly zero if nothing touches. LS-DYNA writes forces at each state; Radioss writes their impulses
 since the start, which do not change while no force acts, and miss no force.
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Forces, and changes of an impulse, below this share of the largest value are treated as zero [-].
-# Single precision has seven digits, so smaller values are rounding errors.
+# Largest force or impulse change that is treated as zero, as a fraction of the largest value [-].
+# Single precision has seven digits, so forces below this fraction are rounding errors.
 _NOTHING: Final = 1e-6
 
 
 class ContactForce(NamedTuple):
-    """The force of the contact or rigid wall ``name`` over ``time`` (n,) [time].
+    """The force that the contact or rigid wall ``name`` exerts at the times ``time``, shape (n,) [time].
 
     ``impulses`` of shape (n, 3) are those since the state before, 0 for the first state; NaN if unknown [momentum].
     ``acts`` (n,) is True if a force acts between a state and the one before.
@@ -39,7 +39,7 @@ class ContactForce(NamedTuple):
 
     @classmethod
     def of_forces(cls, name: str, time: Samples, forces: Samples) -> ContactForce:
-        """Make a contact force from forces at the states, of shape (n, 3) [force]."""
+        """Make a contact force from forces at the states, shape (n, 3) [force]."""
         is_nonzero = _is_above_round_off(forces)
         acts = is_nonzero.copy()
         acts[1:] |= is_nonzero[:-1]
@@ -51,14 +51,14 @@ class ContactForce(NamedTuple):
 
     @classmethod
     def of_impulses(cls, name: str, time: Samples, impulses: Samples) -> ContactForce:
-        """Make a contact force from impulses since the start, of shape (n, 3) [momentum]."""
+        """Make a contact force from impulses since the start of the run, shape (n, 3) [momentum]."""
         changes = np.zeros_like(impulses)
         changes[1:] = np.diff(impulses, axis=0)
         return cls(name, time, changes, _is_above_round_off(changes))
 
     @classmethod
     def of_changes(cls, name: str, time: Samples, values: Samples) -> ContactForce:
-        """Make a contact force from columns (n, k) of forces or impulses; both change while the force acts.
+        """Make a contact force from columns (n, k) of forces or impulses that change while the force acts.
 
         A force that stays at one value is zero, since a contact lets parts vibrate.
         """
@@ -68,7 +68,7 @@ class ContactForce(NamedTuple):
 
     @property
     def times(self) -> tuple[tuple[float, float], ...]:
-        """Intervals (start, end) in which the force acts, each between two states in which no force acts."""
+        """Intervals (start, end) in which the force acts; each interval is bounded by two states without force."""
         return tuple(
             (
                 float(self.time[max(interval.start - 1, 0)]),
@@ -79,14 +79,14 @@ class ContactForce(NamedTuple):
 
     @property
     def tells(self) -> bool:
-        """True if the force acts at some times but not at all times."""
+        """True if the force acts at some times, but not at all times."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
 def find_force(
     forces: Sequence[ContactForce], kind: str, number: int
 ) -> ContactForce | None:
-    """Return the force of the contact, interface or rigid wall with this number; return None if it is not written."""
+    """Return the force of the contact, interface or rigid wall with a given number; None if the files lack it."""
     head = f"{kind} {number}"
     return next(
         (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None
@@ -96,7 +96,7 @@ def find_force(
 def join_contact_forces(
     pieces: Sequence[ContactForce], keep: NDArray[np.bool_]
 ) -> ContactForce:
-    """Join the forces of one contact in all restart segments of a run; ``keep`` marks the valid states.
+    """Join the forces of one contact from all restart segments of a run; ``keep`` marks the valid states.
 
     Between two restart segments the force acts if it acts just before or after.
     """
@@ -115,6 +115,6 @@ def join_contact_forces(
 
 
 def _is_above_round_off(values: Samples) -> NDArray[np.bool_]:
-    """Return an array that is True for states with values (n, k) above the round-off of the largest value."""
+    """Return True for each state with a value above the round-off of the largest value; ``values`` has shape (n, k)."""
     sizes = np.abs(values).max(axis=1, initial=0.0)
     return np.asarray(sizes > _NOTHING * float(sizes.max(initial=0.0)))

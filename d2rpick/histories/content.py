@@ -1,4 +1,4 @@
-"""Provide the bytes of a file as they were when it was opened, even if the file changes later.
+"""Provide the bytes of a file as they were when the file was opened, even if the file changes later.
 
 A running solver appends to its files, and a restarted one cuts them and writes them anew. Bytes after the size at
 opening are ignored. If a file is cut or rewritten while it is read, its size and times show it, which is an error.
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_HELD: Final = 1 << 24  # Files up to this size are kept in memory [bytes].
-_LINES: Final = 1 << 16  # Line ends are counted in pieces of this number of bytes.
+_HELD: Final = 1 << 24  # Largest size of a file that is kept in memory [bytes].
+_LINES: Final = 1 << 16  # Number of bytes in which line ends are counted at once.
 # Number of bytes at each end of a file that are compared to recognise the file after it has grown.
 _END: Final = 1 << 12
 
@@ -54,11 +54,11 @@ class Content:
         return self._data[where]
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Return the offset of the first ``wanted`` at or after ``begin``, or -1."""
+        """Return the offset of the first occurrence of ``wanted`` at or after ``begin``, or -1."""
         return self._data.find(wanted, begin)
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Return the offset of the last ``wanted`` between ``begin`` and ``end``, or -1."""
+        """Return the offset of the last occurrence of ``wanted`` between ``begin`` and ``end``, or -1."""
         return self._data.rfind(wanted, begin, end)
 
     def view(self, begin: int, end: int) -> Bytes:
@@ -66,11 +66,11 @@ class Content:
         return np.frombuffer(self._data, np.uint8)[begin:end]
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Return ``width`` bytes at each of many offsets, shape (n, width)."""
+        """Return ``width`` bytes at each of n offsets, shape (n, width)."""
         return _gather_fields(self.view(0, len(self)), addresses, width)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows of ``room`` (n, width) with bytes at ``begin`` and every ``stride`` after it.
+        """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and at every ``stride`` bytes after it.
 
         Return the ``rest`` bytes after the last stride, fewer if the file ends before.
         """
@@ -91,7 +91,7 @@ def make_content(data: bytes | Content) -> Content:
 
 
 class OnDisk(Content):
-    """The bytes of a file, read from disk at each request.
+    """The bytes of a file, which are read from disk at each request.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ class OnDisk(Content):
         State of the file when no write is pending.
     """
 
-    # Sizes of the pieces of a file that are read at once [bytes].
-    # Piece size for requests of many bytes: a power of 2 that fits into the processor's cache.
+    # Number of bytes that are read at once for a request of many bytes.
+    # This number is a power of 2 that fits into the processor's cache.
     block = 1 << 19
-    # Largest gap between two fields that are read together, because a system call costs more than the gap.
+    # Largest gap between two fields that are read together [bytes]; reading a larger gap costs more than a system call.
     gap = 1 << 13
-    # Piece size for requests of few bytes, because the next request is mostly for the bytes that follow.
+    # Smallest number of bytes read at a time, because the next request is usually for the bytes that follow.
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
@@ -145,14 +145,14 @@ class OnDisk(Content):
         if begin < end and (begin < first or end > first + len(window)):
             if end - begin > self.window:
                 return self.view(begin, end).tobytes()
-            # A backward search needs the bytes before the window.
+            # A backward search needs the bytes before the current window.
             first = begin if begin >= first else max(0, end - self.window)
             window = self.view(first, min(first + self.window, self._size)).tobytes()
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
-        """Return the offset of the first ``wanted`` at or after ``begin``, or -1."""
+        """Return the offset of the first occurrence of ``wanted`` at or after ``begin``, or -1."""
         for start in range(begin, self._size, self.gap):
             piece = self[start : start + self.gap + len(wanted) - 1]
             index = piece.find(wanted)
@@ -161,7 +161,7 @@ class OnDisk(Content):
         return -1
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
-        """Return the offset of the last ``wanted`` between ``begin`` and ``end``, or -1."""
+        """Return the offset of the last occurrence of ``wanted`` between ``begin`` and ``end``, or -1."""
         for stop in range(end, begin, -self.gap):
             first = max(begin, stop - self.gap)
             index = self[first:stop].rfind(wanted)
@@ -176,7 +176,7 @@ class OnDisk(Content):
         return data
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Return ``width`` bytes at each of many offsets, shape (n, width); valid only after a `check`."""
+        """Return ``width`` bytes at each of n offsets, shape (n, width); they are valid only after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):
             order = np.argsort(addresses, kind="stable")
             fields = np.empty((addresses.size, width), np.uint8)
@@ -217,7 +217,7 @@ class OnDisk(Content):
         return fields
 
     def sha256(self) -> str:
-        """Return the SHA-256 of the bytes; raise ChangedError if they differ from those read before."""
+        """Return the SHA-256 of the bytes; raise ChangedError if they differ from the bytes read before."""
         if not self._digest:
             import hashlib
 
@@ -241,31 +241,31 @@ class OnDisk(Content):
             raise self._shortened()
 
     def _shortened(self) -> ChangedError:
-        """Return the error for a file that became shorter."""
+        """Return the error for a file that has become shorter."""
         problem = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
         return ChangedError(
             f"{problem}; is a solver writing it anew? Read it again when it has"
         )
 
     def check(self) -> None:
-        """Raise ChangedError unless everything read so far belongs to one state of the file."""
+        """Raise ChangedError unless everything read so far belongs to one snapshot of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # A write may be in progress, because a write changes the time first and the size last.
+            # A write may be in progress, because a write changes the modification time first and the size last.
             wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        # True if the file has grown or was renamed, so that its earlier bytes may be unchanged.
+        # True if the file has grown or was renamed, in which case its earlier bytes may be unchanged.
         untouched = now.size > self._size or now.modified == self._state.modified
         if not untouched or self._read_ends() != self._ends:
             problem = f"{self._name}: the file was rewritten while it was read"
             raise ChangedError(f"{problem}; read it again when it is complete")
 
     def check_ends(self, ends: tuple[bytes, bytes]) -> None:
-        """Raise ChangedError unless the file still has these first and last bytes."""
+        """Raise ChangedError unless the file still has the given first and last bytes."""
         self._ends = ends
         self.check()
 
@@ -278,7 +278,7 @@ class OnDisk(Content):
 
 
 class Scattered(OnDisk):
-    """The bytes of a file that is read at a few scattered offsets.
+    """The bytes of a file that is read at a few widely spaced offsets.
 
     The file is opened for each request, since a run may have written more such files than a process may have open.
     """
@@ -291,7 +291,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
-        """The window of each thread; it is created at its first use, because most files need no window."""
+        """The window of the current thread; it is created at its first use, because most files need no window."""
         from threading import local
 
         return local()
@@ -320,7 +320,7 @@ class Scattered(OnDisk):
             self._fill_from(file, room, begin)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows as `Content.fill_rows` does; the file is opened once."""
+        """Fill the rows as `Content.fill_rows` does; the file is opened only once."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
             for row, address in zip(room, range(begin, end, stride), strict=True):
@@ -330,7 +330,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files that are read at few offsets, after pending writes to them have ended.
+    """Return the contents of files that are read at a few offsets, once no write to these files is in progress.
 
     Raises
     ------
@@ -342,7 +342,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
 
 
 def open_content(name: str) -> bytes | OnDisk:
-    """Return the content of a file. A small file, or one that is not a regular file, is returned as bytes.
+    """Return the content of a file. A small file, or a file that is not a regular file, is returned as bytes.
 
     Raises
     ------
@@ -380,7 +380,7 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
 
 
 def count_line_number(data: Content, address: int) -> int:
-    """Return the number of the line at an offset, counted from 1."""
+    """Return the number of the line that contains an offset, counted from 1."""
     pieces = (data[at : min(at + _LINES, address)] for at in range(0, address, _LINES))
     return 1 + sum(piece.count(b"\n") for piece in pieces)
 

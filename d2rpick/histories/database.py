@@ -1,4 +1,4 @@
-"""Represent a file of a run, and several restart segments, as a database of columns that are read on request.
+"""Represent a file of a run, or several restart segments, as a database of columns that are read on request.
 
 Databases of different formats that one run wrote are companions; they are checked here for being of one run.
 """
@@ -36,28 +36,28 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest share of the states at which a time may step back. Other columns step back more often than a restart.
+# Largest fraction of the states at which a time may step back [-]; columns other than times exceed it.
 _MOST_BACK: Final = 0.1
-# Significant digits by bytes per number: single precision has 7 digits, and 17 digits restore every double.
+# Significant digits, keyed by the bytes of a number: single precision has 7, and 17 digits preserve every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# An interval between states is a gap in the output if it is this many times the median interval.
+# Smallest ratio of an interval between states to the median interval at which the interval is a gap in the output [-].
 _LONG = 30.0
 # Number of states whose time steps are compared at once, so that they fit into the processor's cache.
 _PIECE: Final = 1 << 15
-# Smallest share of the times of the coarser database that the other database of the same run also has.
+# Smallest fraction of the times in the coarser database that another database of the same run also contains [-].
 # A solver writes all databases of a run at its own cycles, even if their output intervals differ.
 _FEWEST = 0.5
 # Largest difference of the end times of databases of one run [output intervals]; a killed run lacks some states.
 _ENDS_APART = 2.0
-# Tolerances by which the internal energy of the parts may exceed the energy of the model.
-# _MORE is relative to the largest energy of the model; solver files need less than 0.1 %.
-# _ROUND_OFF is relative to the largest kinetic energy.
+# Tolerances for the excess of the internal energy of the parts over the energy of the model.
+# _MORE: excess relative to the largest energy of the model [-]; solver files need less than 0.1 %.
+# _ROUND_OFF: excess relative to the largest kinetic energy [-].
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one restart segment of a run, in the units of the run; each reader defines what they contain.
+    """The states of one restart segment of a run, in the units of the run; each reader defines their contents.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -108,11 +108,11 @@ class Database:
 
     @property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of contacts and rigid walls; raises FormatError if the files have forces that cannot be read."""
+        """Forces of contacts and rigid walls; raises FormatError if the files contain forces that cannot be read."""
         return ()
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return where a later read of each file can begin; empty if the format is always read completely."""
+        """Return the place in each file where a later read can begin; empty if the format is always read completely."""
         return {}
 
     def branch(self, name: str) -> Database:
@@ -122,12 +122,12 @@ class Database:
 
     @cached_property
     def time(self) -> Samples:
-        """Times of the whole model, shape (n,) [time]."""
+        """Times of the states of the whole model, shape (n,) [time]."""
         return self.branch("glstat").time
 
     @cached_property
     def part_time(self) -> Samples:
-        """Times of the parts, shape (m,) [time]."""
+        """Times of the states of the parts, shape (m,) [time]."""
         return self.branch("matsum").time
 
     def channel(self, name: str) -> Samples:
@@ -151,20 +151,20 @@ class Database:
         return None
 
     def find(self, wanted: str) -> str:
-        """Return the column that is selected by name or, in tables, by number; else a FormatError lists the columns."""
+        """Return the column selected by name or, in tables, by number; otherwise a FormatError lists the columns."""
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
+        """Return the energy unit in the name of a column; empty if the name contains no unit."""
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
-        """Return the precision of the times and of these channels; if there are no channels, that of the parts."""
+        """Return the precision of the times and of these channels or, without channels, of the parts."""
         return Precision(self.digits), Precision(self.digits)
 
 
 class Legs:
-    """The restart segments of one run, in order, as one `Database`; in overlaps the newer segment is used.
+    """The restart segments of one run in order, as one `Database`; if two overlap, the newer segment is used.
 
     A single segment needs this too if a restart wrote states again, or if printed times are equal. Segments that have
     no states are used only if no segment has states.
@@ -177,15 +177,15 @@ class Legs:
         named: Sequence[tuple[str, str]] = (),
         notes: Sequence[str] = (),
     ) -> None:
-        self._cut = cut  # Names of packed files that are truncated.
-        self._own_notes = notes  # Notes on files that were not read.
+        self._cut = cut  # Names of the packed files that are truncated.
+        self._own_notes = notes  # Notes on the files that were not read.
         self._named = named  # Quantities whose channels have unusual names.
         self._files = self._legs = [*legs]
         if len(legs) > 1:  # The times of a single restart segment may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
             with_states = [leg for leg in self._files if _find_start(leg) > -np.inf]
             self._legs = with_states or self._files
-        # Part ids and energies of the most recent request.
+        # Part ids and energies from the most recent request.
         self._energies: tuple[tuple[int, ...], Samples] | None = None
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
@@ -195,7 +195,7 @@ class Legs:
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return where a later read of the files of the run can begin; empty if they are read completely."""
+        """Return the place in each file where a later read can begin; empty if the files are read completely."""
         points: dict[str, ResumePoint] = {}
         for leg in self._files:
             points |= leg.find_resume_points()
@@ -203,7 +203,7 @@ class Legs:
 
     @property
     def energy_channel(self) -> str | None:
-        """Name of the internal energy of the whole model."""
+        """Name of the internal energy channel of the whole model."""
         return self._legs[0].energy_channel
 
     @cached_property
@@ -216,7 +216,7 @@ class Legs:
 
     @cached_property
     def quantities(self) -> Mapping[str, str]:
-        """Channels of the quantities of `d2rpick.histories.names.QUANTITIES`, recognised by their names.
+        """Channels that were recognised by their names, keyed by quantity of `d2rpick.histories.names.QUANTITIES`.
 
         If several channels are named like a quantity, none of them is used, unless one has exactly the name of the
         quantity.
@@ -242,8 +242,8 @@ class Legs:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the restart segments, and on states between them that were left out."""
-        # The columns are read first, because reading them may add notes to the restart segments.
+        """Notes of the restart segments, and notes on states between them that were left out."""
+        # The columns are read first, because this may add notes to the restart segments.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
         notes += [
@@ -277,11 +277,11 @@ class Legs:
         return self._joined([leg.part_time for leg in self._legs], self._parts_kept[0])
 
     def find(self, wanted: str) -> str:
-        """Return the column that the user selects."""
+        """Return the name of the column that the user selects."""
         return self._legs[0].find(wanted)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy in the name of a column; empty if the name contains no unit."""
+        """Return the energy unit in the name of a column; empty if the name contains no unit."""
         return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
@@ -289,7 +289,7 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of the given parts; energies are kept, because they are requested repeatedly."""
+        """Return a quantity of the given parts; energies are cached, because they are requested repeatedly."""
         if (
             quantity == "internal_energy"
             and self._energies
@@ -307,7 +307,7 @@ class Legs:
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:
-        """Numbers of the nodes whose displacements all restart segments have."""
+        """Numbers of the nodes whose displacements are in all restart segments."""
         common = set(self._legs[0].node_ids)
         for leg in self._legs[1:]:
             common.intersection_update(leg.node_ids)
@@ -390,7 +390,7 @@ def _join_columns(columns: Sequence[Samples]) -> Samples:
 
 
 def _list_times(database: Database | Legs) -> list[Samples]:
-    """Return the times of the whole model and of the parts, if there are any."""
+    """Return the times of the whole model and of the parts, as far as the database has them."""
     return [
         *([database.time] if database.channels else []),
         *([database.part_time] if database.parts else []),
@@ -398,25 +398,25 @@ def _list_times(database: Database | Legs) -> list[Samples]:
 
 
 def _find_start(leg: Database) -> float:
-    """Return the first time of a restart segment, -inf if it has no states."""
+    """Return the first time of a restart segment [time]; -inf if it has no states."""
     return min(
         (float(time[0]) for time in _list_times(leg) if time.size), default=-np.inf
     )
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a restart segment: its start, then its name, regardless of the order of the arguments."""
+    """Return the sort key of a restart segment: its start time, then its name, whatever the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
 
 def _count_digits(precision: Precision) -> int:
-    """Return the number of decimals of a precision, or its number of significant digits if decimals are unknown."""
+    """Return the number of decimals of a precision, or its number of significant digits if the decimals are unknown."""
     return precision.digits if precision.decimals is None else precision.decimals
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output; a restart segment may be missing there."""
+    """Return notes on long intervals without output, for which a restart segment may be missing."""
     if time.size < 4:
         return ()
     pieces = (
@@ -426,7 +426,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
     shortest, longest = zip(
         *((piece.min(), piece.max()) for piece in pieces), strict=True
     )
-    # Output intervals are usually regular, so that there is no gap to find.
+    # Output intervals are usually regular, so that there are no gaps to search for.
     if max(longest) <= _LONG * min(shortest):
         return ()
     steps = np.diff(time)
@@ -438,14 +438,14 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
 
 
 def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
-    """Raise FormatError if parts have more internal energy than the whole model at the same times.
+    """Raise FormatError if the parts have more internal energy than the whole model at the same times.
 
     ``energies`` are those of some parts of ``holder``, shape (n, parts) [energy].
     """
     try:
         if whole is holder or whole.energy_channel is None:
             return
-    except FormatError:  # An ambiguous energy is reported when it is read.
+    except FormatError:  # An ambiguous energy is reported later, when it is read.
         return
     in_parts, in_model = _find_coincident(
         holder.part_time,
@@ -471,7 +471,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases that have few printed times in common, or different end times."""
+    """Yield a note on each pair of databases with few printed times in common, or with different end times."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue
@@ -498,7 +498,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of another time, and the indices of these other times.
+    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
 
     Examples
     --------
@@ -519,7 +519,7 @@ def _find_coincident(
 
 
 def _compute_tolerance(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
-    """Return by how much a printed time may differ between databases [time]."""
+    """Return the largest difference of a printed time between databases that rounding can cause [time]."""
     ends = zip(databases, times, strict=True)
     return (
         sum(

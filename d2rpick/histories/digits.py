@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     Samples = NDArray[np.float64]
 
 _DIGITS: Final = 6  # Number of significant digits with which times are printed.
-# A sum of times keeps this number of significant digits, more than files have and fewer than a double has.
+# Number of significant digits of a sum of times; files have fewer digits, and a double has more.
 _EXACT: Final = 12
 
-# Sizes of the units of time by their names [s], as strings because 0.001 is not exact as a double.
+# Sizes of the time units, keyed by name [s], as strings because 0.001 has no exact double.
 _SIZES: Final = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), "1"),
     **dict.fromkeys(("ms", "msec"), "1e-3"),
@@ -31,12 +31,12 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# A time converted to ms or us must lie beyond this first share of the record to be plausible.
+# Smallest plausible value of a time converted to ms or us, as a fraction of the record from its start [-].
 _NEVER_MEANT: Final = 0.01
-# A time converted to a smaller unit must lie beyond this first share of the record to be suggested.
+# Smallest value of a time converted to a smaller unit that is suggested, as a fraction of the record [-].
 _HARDLY_MEANT: Final = 0.05
-# A td among this number of first states is assumed to have another unit, because it would hardly save time.
-# A td and 1000 times this td both lie in the record only if the record has 1000 states or more.
+# Number of first states at which a td is assumed to be in another unit, because it would hardly save time.
+# Only in a record of 1000 or more states can both a td and 1000 times this td be times of the record.
 _FIRST_STATES: Final = 10
 
 
@@ -52,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the earlier of the time and the time as printed with six digits.
+    """Return the time rounded to six printed digits, or the time itself if that is earlier.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def round_to_first_as_read(time: float) -> float:
 
 
 def sum_times_as_read(time: float, further: float) -> float:
-    """Add two printed times without the spurious digits of a sum of doubles.
+    """Add two printed times, without the spurious digits of a sum of doubles.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def round_down_as_read(time: float) -> float:
 
 
 def format_window(start: float, end: float) -> str:
-    """Format a window so that its printed ends are within it. A very short window is printed with all digits.
+    """Format a window such that its printed ends lie within it. A very short window is printed with all digits.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def format_window(start: float, end: float) -> str:
 
 
 def format_distinctly(numbers: Sequence[float]) -> list[str]:
-    """Format numbers with six digits, or with as many as are needed to distinguish different numbers.
+    """Format numbers with six digits, or with as many digits as are needed to distinguish different numbers.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def format_beyond_limit(value: float, limit: float) -> str:
 
 
 def parse_seconds(text: str) -> Decimal | None:
-    """Return a time with a unit exactly [s]; None if the string is not such a time.
+    """Return the exact value of a time with a unit [s]; None if the string is not such a time.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def parse_seconds(text: str) -> Decimal | None:
 
 
 def convert_to_unit(text: str, unit: str) -> float | None:
-    """Return a time with a unit as a number in another ``unit``; None if it is not a time or has an unknown unit.
+    """Return a time with a unit as a number in another ``unit``; None if it is no time or if its unit is unknown.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def _find_next_printed(printed: float) -> float:
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Ask if the times of an argument outside a ``record`` (n,) were given in a smaller unit; return the question.
+    """Return the question whether times of an argument outside a ``record`` (n,) were given in a smaller unit.
 
     The question is empty if that does not explain the value.
 
@@ -211,7 +211,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Ask if early times of an argument in a ``record`` (n,) in ms or us were given in s; return the question.
+    """Return the question whether early times of an argument in a ``record`` (n,) in ms or us were given in s.
 
     The question is empty if that does not explain the value.
     """
@@ -244,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # The unit us is tried first, because a value in ms would lie too early in the record if both units fit.
+    # The unit us is tried first, because a value in ms would lie too early in the record if both units are possible.
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -258,6 +258,6 @@ def _scale_times(times: Sequence[float], size: float) -> list[float]:
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Ask the user whether an argument was meant in another unit, and name the values in the unit of the record."""
+    """Return the question whether an argument was meant in another unit, with the converted values."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

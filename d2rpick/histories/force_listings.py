@@ -37,12 +37,12 @@ _WALL_LINE: Final = (
 )
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
-# Number of bytes at the start of a file that contain its complete legend.
+# Number of bytes at the start of a file that contain the complete legend.
 _HEAD: Final = 1 << 16
 
 
 class _Rows(NamedTuple):
-    """The forces of all lines: id (n,), time (n,) and force (n, 3)."""
+    """The contents of all data lines: id (n,), time (n,) and force (n, 3)."""
 
     ids: Samples
     time: Samples
@@ -55,7 +55,7 @@ def recognises(head: bytes) -> bool:
 
 
 def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Return the forces of files; several files with the same contact are restart segments of a run.
+    """Return the forces in files; several files with the same contact are restart segments of a run.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the restart segments of one contact; in overlaps the newer segment is used."""
+    """Join the restart segments of one contact; if two overlap, the newer segment is used."""
     return join_contact_forces(
         pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
@@ -109,14 +109,14 @@ def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, S
 
 
 def _read_contact_rows(data: bytes) -> _Rows:
-    """Read the lines of an rcforc."""
+    """Read the data lines of an rcforc."""
     lines = np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 5)
     return _Rows(numbers[:, 0], numbers[:, 1], numbers[:, 2:])
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the lines of an rwforc. If the components are missing, the normal force becomes the first component."""
+    """Read the data lines of an rwforc. If the components are missing, the normal force becomes the first component."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]
@@ -126,7 +126,7 @@ def _read_wall_rows(data: bytes) -> _Rows:
 
 
 def _read_titles_of_legend(head: bytes) -> dict[int, str]:
-    """Return the titles in the legend, by contact number."""
+    """Return the titles in the legend, keyed by contact number."""
     legend = re.search(_LEGEND, head)
     entries = re.findall(_ENTRY, legend[0]) if legend else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}

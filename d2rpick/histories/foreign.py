@@ -20,8 +20,8 @@ _FROM_FRAME: Final = (
     "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
-# LS-DYNA's ASCII databases that contain no internal energy of the model or of its parts.
-# ASCII databases are recognised by their file names, and by words that no other database contains.
+# Names of LS-DYNA's ASCII databases that contain no internal energy of the model or of its parts.
+# An ASCII database is recognised by its file name, and by words that no other database contains.
 _DYNA_DATABASES: Final = (
     ("nodout", rb"n o d a l   p r i n t   o u t"),
     ("elout", rb"e l e m e n t   s t r e s s"),
@@ -66,19 +66,19 @@ _DYNA_DATABASES: Final = (
     ),
 )
 _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# Pattern of a keyword at the start of a line, in an LS-DYNA deck or a Radioss starter or engine file.
+# Pattern of a keyword at the start of a line in an LS-DYNA deck, or in a Radioss starter or engine file.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
 class ForeignFormat(NamedTuple):
-    """A format that contains no energy history; ``pattern`` matches the first bytes of its files."""
+    """A file format without an energy history; ``pattern`` matches the first bytes of its files."""
 
     pattern: bytes
     name: str
     cure: str
 
 
-# Formats recognised by their first bytes, from the most specific to the most general.
+# Formats that are recognised by their first bytes, from the most specific to the most general.
 _BINARY_FORMATS: Final = (
     ForeignFormat(
         rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
@@ -137,7 +137,7 @@ _BINARY_FORMATS: Final = (
     ),
 )
 
-# Formats recognised by their first lines.
+# Formats that are recognised by their first lines.
 _TEXT_FORMATS: Final = (
     ForeignFormat(
         rb"(?:Data format edition number|(?:Test object number|Name of the channel|Channel code)\s*:).*",
@@ -218,7 +218,7 @@ def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> Non
 
 
 def _name_dyna_database(source: str, head: bytes) -> str:
-    """Return the name of an ASCII database of LS-DYNA, by content or file name; empty if it is unknown."""
+    """Return the name of an ASCII database of LS-DYNA according to content or file name; empty if it is unknown."""
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
@@ -227,7 +227,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
 
 
 def _is_deck(head: bytes) -> bool:
-    """Return True if the content begins with a deck, possibly after comments."""
+    """Return True if the content begins with deck keywords, possibly after comments."""
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
     first = next(
         (line for line in lines if line.strip() and not line.lstrip().startswith(b"$")),

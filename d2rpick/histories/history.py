@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 Samples: TypeAlias = "NDArray[np.float64]"
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Largest energy that is accepted; squares of larger energies overflow a double.
+# Largest energy that is accepted [energy]; squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Largest speed of a part at rest, relative to the fastest part; single precision leaves such speeds.
+# Largest speed of a part at rest, relative to the fastest part [-]; single precision leaves such speeds.
 _STILL: Final = 1e-6
 # Number of times at which the energy is interpolated at once, so that the work arrays stay small.
 _TOGETHER: Final = 1 << 14
@@ -75,7 +75,7 @@ class Precision(NamedTuple):
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
-        """Return the rounding error of printed values: half the printed step of the largest value."""
+        """Return the rounding error of printed values: half of the printed step at the largest value."""
         return self.quantum(float(np.abs(values).max())) / 2
 
 
@@ -106,7 +106,7 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Return the momenta with another choice of parts to switch; stored results are kept."""
+        """Return the momenta for another choice of parts to switch; computed results are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(copy, "memory", self.memory)
         return copy
@@ -116,14 +116,14 @@ class Momenta:
         return _sum_momenta(self, *members)
 
     def noise(self, members: Sequence[int]) -> float:
-        """Return the rounding error of the sum of these printed momenta [momentum]."""
+        """Return the rounding error of the sum of the printed momenta of these parts [momentum]."""
         largest = np.abs(np.stack(self._bounds))[:, list(members)].max(
             axis=(0, 2), initial=0.0
         )
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of the moving parts among these indices [mass]; NaN if one mass is unknown."""
+        """Return the mass of the moving parts among the parts with these indices [mass]; NaN if a mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -156,7 +156,7 @@ class Momenta:
 
 
 class Track(NamedTuple):
-    """A vector over time: ``time`` of shape (n,), ``values`` of shape (n, 3), such as a momentum or a position."""
+    """A vector over time, such as a momentum or a position: ``time`` of shape (n,), ``values`` of shape (n, 3)."""
 
     time: Samples
     values: Samples
@@ -178,7 +178,7 @@ def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at ``time``, shape (n,); a term that the files do not contain is None.
+    """Energies of the whole model at the times ``time``, shape (n,); an energy missing in the files is None.
 
     ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
     damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
@@ -219,12 +219,12 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Hourglass energy (n,), even if it is part of the internal energy; None if it is unknown."""
+        """Hourglass energy, shape (n,), even if the internal energy contains it; None if it is unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
     def worked(self) -> Samples | None:
-        """External work (n,); None if it is not written, or always zero."""
+        """External work, shape (n,); None if the files do not contain it, or if it is always zero."""
         if self.external_work is None or not np.ptp(self.external_work):
             return None
         return self.external_work
@@ -251,7 +251,7 @@ class Given:
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
+        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
         return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
@@ -325,7 +325,7 @@ class History:
         return self.evidence.momenta
 
     def find_momenta(self, *, of_parts: bool) -> Momenta | None:
-        """Return the momenta of the parts, or of the whole model; None if they are not written."""
+        """Return the momenta of the parts, or of the whole model; None if the files do not contain them."""
         for momenta in self.momenta:
             if (momenta.parts is not None) is of_parts:
                 return momenta
@@ -333,7 +333,7 @@ class History:
 
     @property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are known; an unknown mass is NaN, and None means no known mass [mass]."""
+        """Masses of the parts whose momenta are known [mass], with NaN for an unknown mass; None if all are unknown."""
         return self.evidence.masses
 
     @property
@@ -363,23 +363,23 @@ class History:
 
     @property
     def turns(self) -> Samples:
-        """Times of the states at which the energy turns, ascending [time]."""
+        """Times of the states at which the energy has an extremum, ascending [time]."""
         return self._turns[0]
 
     @cached_property
     def peaks(self) -> Samples:
-        """Times of the states at which the energy peaks, ascending [time]."""
+        """Times of the states at which the energy has a maximum, ascending [time]."""
         return np.asarray(self.turns[self._turns[1]])
 
     @cached_property
     def _turns(self) -> tuple[Samples, NDArray[np.bool_]]:
-        """Times at which the energy turns, and an array that is True for peaks."""
+        """Times of the energy extrema, and an array that is True for maxima."""
         indices, are_peaks = find_turns(self.energy)
         return self.time[indices], are_peaks
 
     @property
     def left_beside(self) -> str:
-        """A question about later restart segments that the user did not name; empty if the folder has none."""
+        """A question about later restart segments that the user did not name; empty if the folder contains none."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.source import find_later_legs
 
@@ -419,7 +419,7 @@ class History:
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError if times of an ``argument`` in the record seem to be given in another unit."""
+        """Raise RangeError if the times of an ``argument`` seem to be given in another unit than that of the record."""
         # Usually no time lies below 1/1000 of the record, so that no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return
@@ -462,7 +462,7 @@ class History:
         return np.where(times >= t1, e1, slope * (times - t0) + e0)
 
     def mean_energy(self, start: float, end: float) -> float | None:
-        """Return the mean energy of the states in a window; None if there is no state [energy]."""
+        """Return the mean energy of the states in a window [energy]; None if the window contains no state."""
         energy = self.between(start, end)[1]
         return float(energy.mean()) if energy.size else None
 
@@ -473,7 +473,7 @@ class History:
 
 
 def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
-    """Return by name the arrays of a record that have one row for each of its times; part masses have no such rows."""
+    """Return the arrays of a record with one row per time, keyed by name; part masses have no such rows."""
     columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)
@@ -497,7 +497,7 @@ def select_states(
 
 
 def freeze(values: ArrayLike) -> Samples:
-    """Return values as a read-only array of doubles; a complete array of this kind is not copied."""
+    """Return values as a read-only array of doubles; an array that is already suitable is not copied."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64

@@ -1,4 +1,4 @@
-"""Recognise and refuse tables with a row for each time and part, because they contain no single energy history."""
+"""Recognise and reject tables with a row for each time and part, because they contain no single energy history."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# An energy belongs to several parts if it varies this many times more from row to row than noise explains.
-# If there is no noise, a single energy varies as much from row to row as from time to time.
+# Smallest ratio of the energy variation between rows to that explained by noise, for energies of several parts [-].
+# Without noise, a single energy varies as much from row to row as from time to time.
 # Noise multiplies the variation from row to row by at most the number of rows per time.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
 
 
 def is_of_several_parts(time: Samples, energy: Samples) -> bool:
-    """Return True if an energy (n,) jumps between rows of the same time (n,), as energies of several parts do."""
+    """Return True if an energy (n,) jumps between rows with the same time (n,), as energies of several parts do."""
     rows = count_rows_per_time(time)
     if rows == 1:
         return False

@@ -34,7 +34,7 @@ _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 # date on which OpenRadioss corrected the energy of switched elements
 _FIXED: Final = (2026, 1, 13)
-# Commits of the last weeks before this date; an engine built from them may show the year of the correction.
+# Commits from the last weeks before this date; an engine built from them may show the year of the correction.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
@@ -134,7 +134,7 @@ def read_tail(path: str, size: int) -> bytes:
 
 
 def _detect_old_engine(head: bytes, tail: bytes) -> str:
-    """Return the evidence that an engine is too old to switch rigid bodies without wrong energies; else empty."""
+    """Return the evidence that an engine reports wrong energies after switching; empty if there is no evidence."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
     commit = re.search(_COMMIT, head)
@@ -159,7 +159,7 @@ class Timing(NamedTuple):
 
 
 class ZoneTimes(NamedTuple):
-    """CPU time per element and cycle [s], over the time of a run [time]; both have the shape (n,)."""
+    """CPU time per element and cycle [s], over the time of a run [time]; both have shape (n,)."""
 
     name: str
     time: Samples
@@ -187,7 +187,7 @@ def read_timing(path: str) -> Timing:
 
 
 def read_zone_times(path: str) -> ZoneTimes:
-    """Read the times per zone cycle of a glstat; raise FormatError if there is none above zero."""
+    """Read the times per zone cycle of a glstat; raise FormatError if none of them is above zero."""
     pairs: list[tuple[float, float]] = []
     time = 0.0
     for line in re.finditer(_ZONE, _read_listing(path)):
@@ -221,7 +221,7 @@ def _read_listing(path: str) -> bytes:
 
 
 def find_radioss_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a Radioss listing; None if it has no summary. A missing number gives 0."""
+    """Return the CPU times in a Radioss listing, with 0 for a missing number; None if the listing has no summary."""
     if _SUMMARY not in data:
         return None
     summary = data[data.rindex(_SUMMARY) :]
@@ -234,7 +234,7 @@ def find_radioss_timing(name: str, data: bytes) -> Timing | None:
 
 
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times of a d3hsp without initialisation; elapsed times replace CPU times that are rounded to 0."""
+    """Return the CPU times in a d3hsp without initialisation; elapsed times replace CPU times that are rounded to 0."""
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
     total = re.search(_D3HSP_TOTAL, table)
@@ -251,7 +251,7 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
 def find_printed_steps(
     run: OpenedRun, *neighbours: str
 ) -> dict[int, tuple[float, str]]:
-    """Return the smallest time step of each part, and the name of the file that contains it.
+    """Return the smallest time step of each part, and the name of the file that contains it, keyed by part id.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
 
 
 def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
-    """Yield parts and time steps from the table of smallest time steps of each d3hsp in the folders of some files."""
+    """Yield the smallest time step of each part, from the table in each d3hsp found next to the given files."""
     from pathlib import Path
 
     for folder in dict.fromkeys(Path(name).parent for name in names):
@@ -303,7 +303,7 @@ def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float
 
 
 def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
-    """Return the part id and the time step; a truncated time step gives 0."""
+    """Return the part id and the time step; the time step is 0 if it is truncated."""
     try:
         return int(part), float(step)
     except ValueError:

@@ -24,7 +24,7 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of how well a column name matches a quantity, from the best to the worst.
+# Ranks of the match between a column name and a quantity, from the best to the worst.
 # The rank depends on the words that a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
@@ -51,20 +51,20 @@ _TIME_WORDS: Final = frozenset(
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
 # Pattern of the name of a Radioss time history file, such as T01.
 _SOURCE: Final = re.compile(r"t\d\d")
-# Names of datasets whose group names the quantity, as in H5MD.
+# Names of datasets whose group name contains the quantity, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-# Names of datasets that lie next to the values and contain no quantity.
+# Names of datasets that are stored next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
-# Letters with accents and the letters that replace them, because files often lose accents.
+# Accented letters and the letters that replace them, because files often lose accents.
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
 _LONGEST_PHRASE: Final = 5  # largest number of words in the name of a quantity
 
-# Pattern of words that show a quantity other than the internal energy. KE must be in capitals ("make").
+# Pattern of words that indicate another quantity than the internal energy. KE must be in capitals ("make").
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
@@ -73,7 +73,7 @@ _OTHER_QUANTITY: Final = (
 )
 # Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
 ROTATION_ENERGY: Final = "rotationenergy"
-# Pattern of other names of energies: identifiers of Abaqus, and "energy" in other languages without spaces.
+# Pattern of other energy names: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
@@ -90,7 +90,7 @@ class Meaning(NamedTuple):
 
 
 def _list_phrases() -> Iterator[tuple[str, str]]:
-    """Yield each name of a quantity, without accents, with the quantity."""
+    """Yield each name of a quantity, without accents, together with the quantity."""
     for quantity, names in {"internal_energy": INTERNAL_ENERGY, **QUANTITIES}.items():
         for name in names:
             yield name.translate(_PLAIN_LETTERS), quantity
@@ -155,7 +155,7 @@ def _match_words(words: Sequence[str]) -> Meaning | None:
 
 
 def _match_phrase(words: Sequence[str], start: int) -> int:
-    """Return the number of words of the longest phrase that begins at ``start``, 0 if there is none."""
+    """Return the number of words of the longest phrase that begins at ``start``; 0 if there is none."""
     longest = min(_LONGEST_PHRASE, len(words) - start)
     for length in range(longest, 0, -1):
         if "".join(words[start : start + length]) in _PHRASES:
@@ -165,7 +165,7 @@ def _match_phrase(words: Sequence[str], start: int) -> int:
 
 @lru_cache(maxsize=1 << 16)
 def is_time(name: str) -> bool:
-    """Return True if a column of this name contains the times of the states.
+    """Return True if a column with this name contains the times of the states.
 
     Examples
     --------
@@ -180,12 +180,12 @@ def is_time(name: str) -> bool:
 
 
 def is_internal_energy(name: str) -> bool:
-    """Return True if a name means internal energy without any other words."""
+    """Return True if a name means internal energy and contains no other words."""
     return find_meaning(name) == Meaning("internal_energy", EXACT)
 
 
 def is_any_internal_energy(name: str) -> bool:
-    """Return True if a name means an internal energy, of the model or of something else."""
+    """Return True if a name means an internal energy, whether of the model or of something else."""
     meaning = find_meaning(name)
     return meaning is not None and meaning.quantity == "internal_energy"
 
@@ -217,7 +217,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
 
 
 def find_quantity(name: str) -> str | None:
-    """Return the quantity of the whole model in `QUANTITIES` that a name means, any other name gives None.
+    """Return the whole-model quantity in `QUANTITIES` that a name means; None for any other name.
 
     Examples
     --------
@@ -231,7 +231,7 @@ def find_quantity(name: str) -> str | None:
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return, for each of `QUANTITIES`, the names that match it with the best rank.
+    """Return the names that match each of `QUANTITIES` with the best rank, keyed by quantity.
 
     If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
     the table. A column named "total" contains the total energy if there is a kinetic energy too.
@@ -264,14 +264,14 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the owner of the only internal energy; () if there are several energies, or none."""
+    """Return the words that name the owner of the only internal energy; empty if there are several energies or none."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
 
 
 def _is_bare_total(name: str) -> bool:
-    """Return True if a name is "total", possibly with a word for energy."""
+    """Return True if a name is "total", possibly together with a word for energy."""
     words = _split_words(name.rpartition("/")[2])
     words = [word for word in words if word not in _ENERGY_WORDS]
     return words == ["total"]
@@ -280,7 +280,7 @@ def _is_bare_total(name: str) -> bool:
 def note_unused_energies(
     channels: Sequence[str], used: Collection[str]
 ) -> tuple[str, ...]:
-    """Return a note on the channels that look like energies and are not ``used``; () if there are none.
+    """Return a note on the channels that look like energies but are not ``used``; empty if there are none.
 
     Examples
     --------
@@ -308,8 +308,8 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 
 def _has_name_of_energy(name: str) -> bool:
-    """Return True if a name means an energy or work, or resembles the name of one."""
-    # The rotational energy is contained in the kinetic energy.
+    """Return True if a name means an energy or work, or resembles such a name."""
+    # The kinetic energy contains the rotational energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
     meaning = find_meaning(name)
@@ -337,7 +337,7 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
-    """Raise FormatError if the only column or curve of a file is named as another quantity."""
+    """Raise FormatError if the only column or curve of a file has the name of another quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
         problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
@@ -345,7 +345,7 @@ def refuse_other_quantity(channel: str, where: str) -> None:
 
 
 def _find_word_of_other_quantity(channel: str) -> str:
-    """Return the word that gives a name another meaning than internal energy, or an empty string."""
+    """Return the word that gives a name another meaning than internal energy; empty if there is none."""
     meaning = find_meaning(channel)
     is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE
     if meaning and meaning.quantity == "internal_energy" and is_known:

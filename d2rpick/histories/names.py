@@ -42,7 +42,7 @@ INTERNAL_ENERGY: Final = frozenset(
 
 # Normalised names of other quantities of the whole model: energies, momentum, velocity and mass.
 # The names of quantities come from LS-DYNA, Radioss, Abaqus, Exodus, lasso-python and several languages.
-# The artificial energy of Abaqus is part of its internal energy; the hourglass energy of other solvers is not.
+# In Abaqus, the internal energy contains the artificial energy; other solvers list the hourglass energy separately.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "kinetic_energy": frozenset(
         {"kineticenergy", "energykinetic", "kinetic", "ke", "allke", "kinen", "kinenergy", "energykin", "kine", "ekin",
@@ -86,7 +86,7 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
-# A name is identified by its beginning only if this has at least this number of letters.
+# Smallest number of letters at the beginning of a name that can identify the name.
 _SHORTEST_BEGINNING: Final = 3
 # Pattern of a number or range of part ids; a string with more digits is a title.
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
@@ -114,7 +114,7 @@ def find_unit(name: str) -> str:
 
 
 def find_energy_unit(name: str) -> str:
-    """Return the unit at the end of the name of an energy; empty if the name has no unit, or no unit of energy.
+    """Return the unit at the end of an energy name; empty if there is no unit, or no energy unit.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def find_energy_unit(name: str) -> str:
 
 
 def check_energy_unit(unit: str) -> str:
-    """Return a unit as it is written, or an empty string if it is not a unit of energy.
+    """Return a unit unchanged if it is an energy unit, otherwise an empty string.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def check_energy_unit(unit: str) -> str:
 
 
 def remove_unit(name: str) -> str:
-    """Return a name without its unit and without the word before the unit. A bracket that contains no unit stays.
+    """Return a name without its unit and without the word before the unit. Brackets without a unit stay.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def remove_unit(name: str) -> str:
 
 
 def _drop_unit(brackets: re.Match[str]) -> str:
-    """Return a bracket, or an empty string if it contains a unit."""
+    """Return a bracketed text, or an empty string if it contains a unit."""
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
@@ -216,7 +216,7 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question with the most similar name, or an empty string; ``likeness`` (0 to 1) is the least similarity.
+    """Return a question with the most similar name; empty if no similarity reaches ``likeness`` (0 to 1).
 
     If no name is similar, the only name that begins with the wanted string is proposed.
 
@@ -252,7 +252,7 @@ def clean_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Return the number that follows the name of a family's first file in another file name; None if there is none.
+    """Return the number after the name of a family's first file in another file name; None if there is none.
 
     Examples
     --------
@@ -272,7 +272,7 @@ class Part(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Title of the part, or its number if it has none."""
+        """Title of the part, or its number if it has no title."""
         return self.title or f"part {self.id}"
 
 
@@ -350,7 +350,7 @@ def select_parts(
 def _match_parts(
     text: str, parts: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
 ) -> Iterator[Part]:
-    """Yield the parts that a string selects: one title, or numbers, ranges and titles between commas."""
+    """Yield the parts that a string selects: one title, or numbers, ranges and titles separated by commas."""
     whole = titled.get(text.strip().casefold())
     if whole and "," in text:  # A title may contain a comma.
         yield _choose_only_part(whole, text, where)
@@ -387,7 +387,7 @@ def _match_piece(
 
 
 def _choose_only_part(titled: Sequence[Part], text: str, where: str) -> Part:
-    """Return the only part with a title; raise FormatError if there are several."""
+    """Return the only part with a given title; raise FormatError if there are several."""
     if len(titled) > 1:
         raise FormatError(
             f"{where}: {text!r} is the title of several parts, choose by number: {list_parts(titled)}"
@@ -396,13 +396,13 @@ def _choose_only_part(titled: Sequence[Part], text: str, where: str) -> Part:
 
 
 def list_parts(parts: Sequence[Part]) -> str:
-    """Return number and title of parts for a message."""
+    """Return numbers and titles of parts for use in a message."""
     return list_names(
         [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
     )
 
 
 def has_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
-    """Return True if strings contain the word "recommended", unless it is the title of a part."""
+    """Return True if strings contain the word "recommended", unless this is the title of a part."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

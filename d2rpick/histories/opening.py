@@ -1,4 +1,4 @@
-"""Open a run: find the reader of each file by the content of the file."""
+"""Open a run: find the reader of each file according to the content of the file."""
 
 from __future__ import annotations
 
@@ -41,21 +41,21 @@ __all__ = [
 # Number of bytes that contain the header of a file and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# Upper limit for the length of the legend of an ASCII database [bytes].
+# Upper limit for the length of the legend in an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
-# A note names at most this number of unused tables.
+# Largest number of unused tables that a note names.
 _MOST_TABLES: Final = 3
 # Characters at the end of the name of a later file of a family.
 _DIGITS: Final = "0123456789"
 
-# Largest difference of energies at a common time of two restart segments, as a share of the largest energy.
+# Largest difference of energies at a common time of two restart segments, relative to the largest energy [-].
 _SAME = 0.01
 # Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50
 
 
 class Reader(Protocol):
-    """The functions that each module of a reader defines; the module of a table format also defines ``write``."""
+    """The functions that each reader module defines; the module of a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
         """Return True if a file with these first bytes has the format of the reader; never raises."""
@@ -98,7 +98,7 @@ def open_run(
 
 
 def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a note on tables of energies in named folders; they are not read next to solver databases."""
+    """Return a note on energy tables in named folders; they are not read next to solver databases."""
     tables = [table for name in names for table in list_tables_of_folder(name)]
     if not tables:
         return ()
@@ -245,7 +245,7 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats; formats that contain only forces come last. Raise FormatError if there are no others."""
+    """Return the formats with those that contain only forces last; raise FormatError if there are no others."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
         # Reading the branch raises the error with the best message about missing data.
@@ -263,7 +263,7 @@ def _is_force_listing(source: Source) -> bool:
 def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
-    """Read the forces of files that contain no energies; return a note instead if they cannot be read."""
+    """Read the forces in files without energies; return a note instead if they cannot be read."""
     try:
         return force_listings.read_listed_forces(sources), ()
     except FormatError as error:
@@ -281,7 +281,7 @@ def _find_later_files(sources: Sequence[Source]) -> set[str]:
 def _open_legs_of_formats(
     kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
 ) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
-    """Open the files by format; return the restart segments of each format, and notes on files that were not used.
+    """Open the files by format; return the restart segments of each format, and notes on unused files.
 
     d3plot families exist next to everything that LS-DYNA writes: they are used only if the other files leave
     something out, and if there are other files, a family that cannot be read is not an error.
@@ -309,14 +309,14 @@ def _has_model_and_parts(legs: Sequence[Database]) -> bool:
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
-    """Raise FormatError if a channel that is named for a quantity is in none of the databases."""
+    """Raise FormatError if a channel that the user names for a quantity is in none of the databases."""
     for quantity, name in selection.channels:
         if not any(quantity in database.quantities for database in databases):
             databases[0].find(name)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
-    """Raise FormatError for ``--time`` if it would be ignored: files of solvers have one time, named 'time'."""
+    """Raise FormatError if ``--time`` would be ignored: solver files have one time, named 'time'."""
     if (
         time is not None
         and time.strip().casefold() != "time"
@@ -328,7 +328,7 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 
 
 def _detect_format(source: Source) -> str:
-    """Return the format of a file. Binary signatures come first; a text is a table only if no other format fits."""
+    """Return the format of a file. Binary signatures come first; a text is a table only if no other format matches."""
     head = _head_of(source)
     is_binary = b"\0" in head
     if is_binary:
@@ -412,7 +412,7 @@ def check_legs(legs: Sequence[Database]) -> None:
                 are_alike = _is_same_energy(
                     columns(first, shared[0]), columns(second, shared[1])
                 )
-            except FormatError:  # The error is reported when the column is read.
+            except FormatError:  # The error is reported later, when the column is read.
                 continue
             if not are_alike:
                 raise FormatError(
@@ -427,7 +427,7 @@ def _list_columns_and_parts(leg: Database) -> set[str | int]:
 
 
 def _list_model_times(leg: Database) -> Samples:
-    """Return the times of the whole model, shape (n,); empty if it has no columns."""
+    """Return the times of the whole model, shape (n,); empty if the segment has no columns."""
     return leg.time if leg.channels else np.empty(0)
 
 
@@ -437,7 +437,7 @@ def _list_part_times(leg: Database) -> Samples:
 
 
 def _read_model_energies(leg: Database, states: Indices) -> Samples:
-    """Return the internal energy of the model at given states, (states,), or an empty array (states, 0)."""
+    """Return the internal energy of the model at given states, shape (states,), or an empty array (states, 0)."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 

@@ -17,12 +17,12 @@ class ResumePoint(NamedTuple):
     end: int
 
     def read_on(self, name: str) -> bytes:
-        """Return the header, and the bytes of a file after ``begin``; raise OSError if it cannot be read."""
+        """Return the header of a file, and its bytes after ``begin``; raise OSError if they cannot be read."""
         with open(name, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             stream.seek(self.begin)
             return self.head + stream.read()
 
     def locate(self, point: ResumePoint) -> ResumePoint:
-        """Convert a resume point in the bytes that `read_on` returned to one with addresses in the file."""
+        """Convert a resume point in the bytes returned by `read_on` to one with addresses in the file."""
         skipped = self.begin - len(self.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)

@@ -53,7 +53,7 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class OpenedRun:
-    """The databases of one run, one per format, the most comprehensive one first.
+    """The databases of one run, one per format, with the most comprehensive one first.
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
@@ -95,7 +95,7 @@ class OpenedRun:
 
     @property
     def name(self) -> str:
-        """The file names, for messages."""
+        """The file names, joined for use in messages."""
         return ", ".join(self.sources)
 
     @property
@@ -134,7 +134,7 @@ class OpenedRun:
         )
 
     def unused_energies(self, selection: Selection) -> tuple[str, ...]:
-        """Return notes on channels of tables that look like energies but are neither selected nor recognised."""
+        """Return notes on table channels that look like energies but are neither selected nor recognised."""
         notes: list[str] = []
         for database in self.databases:
             if not database.named_by_people or not database.channels:
@@ -167,14 +167,14 @@ class OpenedRun:
         return tuple(momenta for momenta in (of_parts, of_whole) if momenta)
 
     def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
-        """Return the parts that have no support; if each part has one, return all parts."""
+        """Return the parts without supports; if all parts have supports, return all parts."""
         return [
             part for part in parts if not self.surroundings.supports_of([part])
         ] or parts
 
     @cached_property
     def _part_momenta(self) -> Momenta | None:
-        """Momenta of all parts; None unless the files contain the momenta of all parts."""
+        """Momenta of all parts; None if the momentum of any part is missing."""
         holder = self._with_parts()
         if holder is None:
             return None
@@ -264,7 +264,7 @@ class OpenedRun:
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
+        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
         for database in self.databases:
             written = [id_ for id_ in database.node_ids if id_ in ids]
             if written:
@@ -273,7 +273,7 @@ class OpenedRun:
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the total momentum of given parts, or of the whole model; None if it is not written."""
+        """Return the total momentum of given parts, or of the whole model; None if the files do not contain it."""
         of_parts = parts is not None
         for momenta in self.momenta(parts, None):
             if (momenta.parts is not None) == of_parts:
@@ -282,7 +282,7 @@ class OpenedRun:
 
     @property
     def part_time(self) -> Samples:
-        """Times of the states in the histories of the parts [time]."""
+        """Times of the states in the part histories [time]."""
         return self._holder().part_time
 
     @cached_property
@@ -306,7 +306,7 @@ class OpenedRun:
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
-        """Return the quantities of the whole model that are written at ``time`` (n,), by name."""
+        """Return the quantities of the whole model that are written at ``time`` (n,), keyed by name."""
         columns: dict[str, Samples] = {}
         for database in self.databases:
             if not database.channels or not np.array_equal(database.time, time):
@@ -321,7 +321,7 @@ class OpenedRun:
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Return the mean position of the centres of given parts [length]; None if they are not written."""
+        """Return the mean position of the centres of given parts [length]; None if the files do not contain it."""
         components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
@@ -334,7 +334,7 @@ class OpenedRun:
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
-        """Return the history of the selected energy only; other data that show flights are left out."""
+        """Return the history of the selected energy only, without other data that show flights."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
@@ -353,7 +353,7 @@ class OpenedRun:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """Return the database with parts; if there is none, raise a FormatError that names what the files contain."""
+        """Return the database with parts; otherwise raise a FormatError that names the contents of the files."""
         holder = self._with_parts()
         if holder is None:
             # The first database raises the error with the best message about missing parts.
@@ -364,13 +364,13 @@ class OpenedRun:
         return holder
 
     def _with_parts(self) -> Legs | None:
-        """Return the first database with parts, or None."""
+        """Return the first database with parts; None if there is none."""
         return next((database for database in self.databases if database.parts), None)
 
     def _of_parts(
         self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
     ) -> History:
-        """Return the history of the summed energy of parts; springs are added only if no other part has energy."""
+        """Return the history of the summed part energies; springs are added only if no other part has energy."""
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
@@ -402,7 +402,7 @@ class OpenedRun:
         return replace(history, springs=tuple(compress(chosen, left_out)))
 
     def _without_springs(self, database: Legs, channel: str) -> History:
-        """Return the history of the model; the energy of springs and dampers is left out if there is other energy."""
+        """Return the history of the model without spring and damper energy, unless there is no other energy."""
         from d2rpick.histories.balance import find_spring_energy
 
         whole = self._of_channels((channel,))
@@ -455,7 +455,7 @@ class OpenedRun:
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
                 if not database.channels:
-                    # A database that has no channels raises the error with the best message about missing channels.
+                    # A database without channels raises the error with the best message about missing channels.
                     database.channel(wanted[0])
                 return database, tuple(database.find(name) for name in wanted)
             except FormatError as error:
@@ -466,7 +466,7 @@ class OpenedRun:
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip
-        """Return the history of an energy (n,) with the names and precisions of its database."""
+        """Return the history of an energy (n,), with the names and precisions of its database."""
         time_precision, energy_precision = database.precisions(names)
         return History(
             time=time,
@@ -487,7 +487,7 @@ class OpenedRun:
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
-    """Return the unit of energy of all these channels; empty if a channel has no unit, or if the units differ."""
+    """Return the energy unit of all these channels; empty if a channel has no unit, or if the units differ."""
     units = {database.find_energy_unit(name) for name in names}
     return units.pop() if len(units) == 1 else ""
 
@@ -526,16 +526,16 @@ class _Written(Given):
         return read_terms(self._run.databases)
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of the requested nodes that the files contain; None if they contain no such node."""
+        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
         return self._run.displacements(ids)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
-        """Return internal energies of given parts; None if they are not written."""
+        """Return internal energies of given parts; None if the files do not contain them."""
         values = give_if_written(lambda: self._run.part_energies(parts))
         return None if values is None else Track(self._run.part_time, values)
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the total kinetic energy of given parts, or of the model; None if it is not written."""
+        """Return the total kinetic energy of given parts, or of the model; None if the files do not contain it."""
         if parts is None:
             return super().kinetic_energy(parts)
         values = give_if_written(lambda: self._run.part_kinetic_energies(parts))
@@ -553,7 +553,7 @@ def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
 
 
 def _compute_median_of_nonzero(values: Samples) -> Samples:
-    """Return the median of each column of values (n, k) over the states in which it is not 0.
+    """Return the median of each column of values (n, k) over the states in which the column is not 0.
 
     The mass of a rigid part is 0 in some states.
     """
@@ -567,5 +567,5 @@ def _compute_median_of_nonzero(values: Samples) -> Samples:
 
 
 def _note_left_out_springs(springs: str) -> str:
-    """Return the note on the energy of springs that is left out."""
+    """Return the note that the energy of springs is left out."""
     return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"

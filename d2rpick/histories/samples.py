@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Smallest share of states that repeat the previous time in a table with a row for each part.
+# Smallest fraction of states that repeat the previous time, in a table with a row for each part [-].
 _REPEATED: Final = 0.49
-# Smallest number of times that is examined; equal times of fewer rows may be a coincidence.
+# Smallest number of times that is examined; in fewer rows, equal times may be a coincidence.
 FEWEST_TIMES: Final = 3
-# Largest ratio of output intervals before and after a restart; other curves and unsorted tables exceed it.
+# Largest ratio of the output intervals before and after a restart [-]; unsorted tables and other curves exceed it.
 _ALIKE = 2.0
 # Number of adjacent windows that are combined into one window of the next level of the search table.
 _TOGETHER: Final = 8
-# A root has converged if it moves by less than this share of its time, which is about the rounding error.
+# Largest relative change of the time of a root that has converged [-]; this is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
 HALVINGS: Final = 50  # number of bisections that narrow a bracket to the rounding error
 
@@ -42,7 +42,7 @@ def find_window(time: Samples, start: float, end: float) -> slice:
 
 
 def get_ends(time: Samples) -> tuple[float, ...]:
-    """Return the first and last of the times (n,), which identify a window of a record; () if there are no times."""
+    """Return the first and last of the times (n,), which identify a window of a record; empty if there are no times."""
     return (*time[:1].tolist(), *time[-1:].tolist())
 
 
@@ -75,7 +75,7 @@ def compute_median(values: Samples) -> Samples:
 
 
 def remove_line(time: Samples, values: Samples) -> Samples:
-    """Return the residual of each column of values (n, k) after a linear fit.
+    """Return the residual of each column of values (n, k) after a linear fit over time.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
 
 
 def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return which states of a file are valid, and notes on the invalid states.
+    """Return a mask of the valid states of a file, and notes on the invalid states.
 
     A state gives way to any later one at or before its time: of equal printed times the last one is valid, and after
     a restart that steps back the newer leg is.
@@ -114,7 +114,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # Usually all times ascend.
+    if np.all(time[1:] > time[:-1]):  # Usually, all times ascend.
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
     equal = int(np.count_nonzero(step == 0))
@@ -141,7 +141,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
 
 
 def count_rows_per_time(time: Samples) -> int:
-    """Return the median number of rows that share a time (n,); 1 if most times occur in one row only.
+    """Return the median number of rows that share a time (n,); 1 if most times occur in only one row.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def count_rows_per_time(time: Samples) -> int:
 
 
 def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
-    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they are not of one run."""
+    """Return times (n,) unchanged; raise FormatError, with the place of the state, if they belong to several runs."""
     state = _find_wrong_step_back(time)
     if state is None:
         return time
@@ -174,7 +174,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
 
 
 def _find_wrong_step_back(time: Samples) -> int | None:
-    """Return the first state at which times (n,) step back and no restart explains it; None if there is none.
+    """Return the first state at which times (n,) step back without a restart that explains it; None if there is none.
 
     One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
     the median) is half to twice the median interval before it.
@@ -200,7 +200,7 @@ def _find_wrong_step_back(time: Samples) -> int | None:
 
 
 def _compute_median_step(steps: Samples) -> float:
-    """Return the median of the time steps, ignoring steps between equal printed times; NaN if none remains."""
+    """Return the median time step, ignoring steps between equal printed times; NaN if there are no other steps."""
     steps = steps[steps > 0]
     return float(compute_median(steps)) if steps.size else np.nan
 
@@ -237,7 +237,7 @@ def find_crossings(
     turn = np.flatnonzero(np.diff(side[off_level]))
     index_before = off_level[turn]
     index_after = off_level[turn + 1]
-    # If samples lie on the level, the crossing is at the first of them.
+    # If several samples lie on the level, the crossing is at the first of them.
     share = np.where(
         index_after == index_before + 1,
         (level - energy[index_before])
@@ -256,7 +256,7 @@ def find_crossings(
 
 
 def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return the indices (k,) at which the energy (n,) turns, and a mask (k,) of the peaks.
+    """Return the indices (k,) of the extrema of the energy (n,), and a mask (k,) of the maxima.
 
     A flat top or bottom is one turn, at its first sample; the ends are no turns.
 
@@ -295,7 +295,7 @@ def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, .
 def find_first_above(
     values: Samples, start: NDArray[np.intp], limit: Samples
 ) -> NDArray[np.intp]:
-    """For each ``start``, return the index (m,) of the first of values (n,) after it that exceeds its ``limit``.
+    """Return, for each ``start``, the index (m,) of the first later value (n,) that exceeds its ``limit``.
 
     The index is n if there is none. The search takes O((n + m) log n).
 
@@ -336,7 +336,7 @@ def merge_times(*times: Samples) -> Samples:
 
 
 def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
-    """Return times and values to draw the curve, shape (2, m): all samples, or the extremes in many intervals.
+    """Return times and values for drawing the curve, shape (2, m): all samples, or the extremes in many intervals.
 
     Parameters
     ----------

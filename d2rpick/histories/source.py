@@ -1,4 +1,4 @@
-"""Find the files of a history and read their bytes: files, folders, globs, standard input."""
+"""Find the files of a history and read their bytes: files, folders, glob patterns, standard input."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,}
 # Pattern of the file names of force listings, which are read together with files that contain energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
-# Number of packed bytes that are unpacked at a time; they become at most 68 MB.
+# Number of packed bytes that are unpacked at a time; they unpack to at most 68 MB.
 _BLOCK = 1 << 16
-# Smallest similarity of a suggested file name, which is high because equal suffixes make names similar.
+# Smallest similarity of a suggested file name [-]; it is high, because equal suffixes make names similar.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 # A table whose first bytes contain this word is probably an energy history.
@@ -111,7 +111,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
 
 
 def _open_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open the files that belong to families by their names; only small parts of these files are read."""
+    """Open the files that belong to families according to their names; only small parts of these files are read."""
     family = re.compile(_FAMILY)
     in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119  pathlib would slow down start-up
     try:
@@ -129,7 +129,7 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
 
 
 def _look_at_state(name: str) -> FileState | None:
-    """Return the state of a file, or None if it is not a regular file."""
+    """Return the state of a file; None if it is not a regular file."""
     try:
         status = os.stat(name)  # noqa: PTH116  pathlib would slow down start-up
     except (OSError, ValueError):
@@ -160,7 +160,7 @@ def _report_empty(name: str) -> FormatError:
 
 
 def _list_files(name: str) -> Sequence[str]:
-    """Return the files of a name: a file with the later files of its family, or the files of a folder or pattern."""
+    """Return the files that a name stands for: a file and its later files, or the files in a folder or pattern."""
     # os.path is used instead of pathlib to keep start-up fast.
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113  pathlib would slow down start-up
         return [name, *_list_later_files(name)]
@@ -227,7 +227,7 @@ def _list_databases(folder: Path) -> list[str]:
 
 
 def list_tables_of_folder(name: str) -> list[str]:
-    """Return the CSV files with energies in a folder that are not read; empty if ``name`` is not a folder."""
+    """Return the unread CSV files with energies in a folder; empty if ``name`` is not a folder."""
     if name == STDIN or not os.path.isdir(name):  # noqa: PTH112  pathlib would slow down start-up
         return []
     from pathlib import Path
@@ -249,7 +249,7 @@ def _read_head(file: Path) -> bytes:
 
 
 def _find_run(file: Path) -> str:
-    """Return the name of the run in the file name of a solver database; empty for any other file."""
+    """Return the run name in the file name of a solver database; empty for any other file."""
     if re.fullmatch(_FORCES, file.name) and file.is_file():
         return "one of LS-DYNA"
     for listed in READERS.values():
@@ -299,7 +299,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question with a similar file name in the folder, a hint if the name is a time, or an empty string."""
+    """Return a question with a similar file name in the folder, or a hint if the name is a time, or an empty string."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
@@ -338,7 +338,7 @@ def _unpack(name: str, packed: bytes | OnDisk) -> Source:
 def _unpack_pieces(
     name: str, packed: bytes, *, keep: bool = True
 ) -> tuple[list[bytes], bool]:
-    """Unpack consecutive gzip files; return their pieces, and True if the last file is truncated."""
+    """Unpack consecutive gzip files; return their contents, and True if the last file is truncated."""
     import zlib
 
     pieces: list[bytes] = []
@@ -362,7 +362,7 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return the files next to these files that have the same name with a higher number and were not named."""
+    """Return the later restart segments next to these files that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     legs: list[str] = []
@@ -382,7 +382,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its restart segment, which is 0 if there is no number."""
+    """Split a file name into its stem and the number of its restart segment; the number is 0 if there is none."""
     match = _NUMBERED.fullmatch(name)
     # The match is never None, because the pattern matches any text.
     assert match is not None

@@ -1,4 +1,4 @@
-"""Represent the external forces on the parts of a run: gravity, supports and prescribed motions of the deck."""
+"""Represent the external forces on the parts of a run: gravity, supports and prescribed motions in the deck."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Support(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
-    """External forces on each part (the key is the part id) and on the whole model (the key is None).
+    """External forces on each part, keyed by part id, and on the whole model, keyed by None.
 
     ``gravity`` are the possible accelerations [length/time^2], with 0 if there are times without gravity; the
     accelerations of a part that is not listed are unknown. ``bodies`` returns the groups of connected parts, () if

@@ -25,7 +25,7 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# Minimum number of cells along a side, so that the step can cover a quarter of the leading side, at least one cell.
+# Smallest number of cells along a side; with fewer cells, the step could not cover a quarter of the leading side.
 _COARSEST = 4
 # Number of bars per cell. The cells of the leading side are listed first, then the cells of the roof.
 _BARS = 5
@@ -189,7 +189,7 @@ def _make_ring(mesh: int) -> Plane:
 
 
 def _scale_ring(ring: Plane, width: float, height: float) -> Plane:
-    """Return the points of a ring with this width and height [m]."""
+    """Return the points of a ring, scaled to a width and height [m]."""
     return ring.real * width + 1j * ring.imag * height
 
 
@@ -208,7 +208,7 @@ def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
 
 
 def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
-    """Return the bars of the step: between its two points, and from each to nearby points of the skin and inside it."""
+    """Return the bars of the step: between its two points, and from each to nearby points of skin and interior."""
     low = 2 * cells
     high = 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]
@@ -223,7 +223,7 @@ def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
 
 
 class Bars:
-    """The current state of a truss's bars: lengths at ``rest`` with plastic elongation [m], ``plastic_work`` [J].
+    """The current state of the bars of a truss: lengths at ``rest`` with plastic elongation [m], ``plastic_work`` [J].
 
     ``points`` is the number of points of the model. A bar depends only on its length, so after a phase in which its
     points moved as one body it continues with the elongation it had, rotated with the body.
@@ -260,7 +260,7 @@ class Bars:
         )
 
     def elastic_energy(self, positions: Plane, rest: Values | None = None) -> Values:
-        """Return the elastic energy of the bars, shape (...) for ``positions`` (..., n) [J].
+        """Return the elastic energy of the bars [J], shape (...) for ``positions`` of shape (..., n).
 
         ``rest`` are the lengths at rest at that time, if they differ from the current lengths (..., bars) [m].
         """
@@ -274,7 +274,7 @@ class Bars:
         rest: Values | None = None,
         plastic_work: Values | None = None,
     ) -> Values:
-        """Return the elastic energy plus plastic work of the current or a past state, shape (...) [J]."""
+        """Return the elastic energy plus plastic work of the current or a past state [J], shape (...)."""
         return self.elastic_energy(positions, rest) + (
             self.plastic_work if plastic_work is None else plastic_work
         )

@@ -27,31 +27,31 @@ from d2rpick.models.box_model import (
     compute_stiffest_rate,
 )
 
-# Stiffness of floor and curb at one point [N/m], lower than that of the box so that it does not limit the time step.
-# The weight of the box makes the box penetrate a floor of this stiffness by 0.5 mm.
+# Stiffness of floor and curb at one point [N/m]; it is lower than that of the box so as not to limit the time step.
+# The weight of the box causes a penetration of 0.5 mm into a floor of this stiffness.
 STIFFNESS = 5e5
-# Below this sliding speed, friction is proportional to the speed [m/s].
-# Typical sliding speeds are 100 times as high.
+# Sliding speed below which friction is proportional to the speed [m/s].
+# Typical sliding speeds are 100 times as high as SLIP.
 SLIP = 0.1
-# A point that is farther below the floor than this has left the sled and does not touch its floor [m].
+# Largest depth below the floor of a point that touches the floor [m]; deeper points have left the sled.
 DEEPEST = 0.1
 # Thickness of the curb, which is the end of the sled [m].
 CURB_THICKNESS = 0.05
 # No point moves faster than FASTEST times the initial speed, plus FALL, plus twice the speed of the drop [m/s].
-# The largest speed of a point gives a time in which no point can reach floor, curb or ground.
+# From the largest speed of any point follows a time within which no point can reach the floor, the curb or the ground.
 # FALL is the speed of a point after a fall of 1 m [m/s].
 FASTEST, FALL = 4.0, 5.0
-# Contact forces that are less than this apart belong to the same contact [s], because corners rattle.
+# Largest time between contact forces that belong to the same contact [s]; it is positive, because corners rattle.
 SAME_CONTACT = 2e-3
 
-# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars that touch nothing.
+# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# A time that exceeds a whole number of time steps by less than this share of a step is rounded down [-].
+# Largest excess of a time over a whole number of time steps that is rounded down, as a fraction of a step [-].
 _SAME = 1e-6
 
 
 class Face(NamedTuple):
-    """Forces that a face exerts on points (n,) [N]: the force normal to it, and the friction along it."""
+    """Forces that a face exerts on points, shape (n,) [N]: the force normal to the face, and the friction along it."""
 
     normal: Plane
     friction: Plane
@@ -70,7 +70,7 @@ class Push(NamedTuple):
 
     @property
     def forces(self) -> Plane:
-        """All forces on the points (n,) [N]."""
+        """All forces on the points, shape (n,) [N]."""
         return self.sled.whole + self.ground.whole
 
 
@@ -136,7 +136,7 @@ class Contact:
         return push
 
     def _sled(self, time: float, on_sled: Plane, velocities: Plane) -> Face:
-        """Return the forces of floor and curb on all points."""
+        """Return the forces of the floor and the curb of the sled on all points [N]."""
         nothing = np.zeros(self._points, dtype=np.complex128)
         if self._p.drop is not None:
             return Face(nothing, nothing)
@@ -170,20 +170,20 @@ class Contact:
         return float(min(to_floor, to_curb, to_ground))
 
     def _floor(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the floor on points of the skin."""
+        """Return the forces of the floor on the points of the skin [N]."""
         above = (positions.real < CURB_THICKNESS) & (positions.imag > -DEEPEST)
         depth = np.where(above, np.maximum(-positions.imag, 0.0), 0.0)
         return self._with_friction(STIFFNESS * depth, sliding.real)
 
     def _ground(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the ground on the points of the skin."""
+        """Return the forces of the ground on the points of the skin [N]."""
         depth = np.maximum(-self._p.ground - positions[self._skin].imag, 0.0)
         return self._with_friction(
             self._p.ground_stiffness * depth, sliding[self._skin].real
         )
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the curb along -x, with friction along z, like a rotated floor."""
+        """Return the forces of the curb along -x [N], with friction along z, like those of a rotated floor."""
         may_touch = (positions.imag < self._p.curb) & (
             positions.real < self._p.cushion_depth + DEEPEST
         )
@@ -198,7 +198,7 @@ class Contact:
         return Face(np.asarray(1j * face.normal), np.asarray(1j * face.friction))
 
     def _with_friction(self, normal: Values, sliding: Values) -> Face:
-        """Return the forces of a floor: ``normal`` up, and friction against ``sliding`` [m/s] along it."""
+        """Return the forces of a floor [N]: ``normal`` upwards, and friction along it against ``sliding`` [m/s]."""
         friction = self._p.friction * normal * sliding / np.hypot(sliding, SLIP)
         return Face(np.asarray(1j * normal), np.asarray(-friction, dtype=np.complex128))
 
@@ -263,7 +263,7 @@ class Accounts:
 
 
 class BoxMotion:
-    """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
+    """The state of a run: ``places`` (n,) at the time step ``count``, ``velocities`` (n,) half a time step earlier.
 
     A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
     the rigid body while there is one, else None; it contains the points of the box, and those of the step if the step
@@ -332,12 +332,12 @@ class BoxMotion:
         self.velocities = np.concatenate([rigid, self.velocities[points.stop :]])
 
     def make_deformable(self) -> None:
-        """Make all parts deformable again: points keep the body's velocities, and bars keep their lengths."""
+        """Make all parts deformable again: points keep the velocities of the body, and bars keep their lengths."""
         self.body = None
         self._deformable_bars = (self.step, self.box)
 
     def advance(self) -> Plane:
-        """Advance the velocities to half a step after the positions; return their mean over the step, (n,) [m/s]."""
+        """Advance the velocities to half a step after the positions; return their mean over the step (n,) [m/s]."""
         old_velocities = self.velocities
         push = self.contact.push(self.time, self.places, old_velocities)
         outer = self._weight + push.forces if push else self._weight
@@ -368,7 +368,7 @@ class BoxMotion:
         self.count += 1
 
     def _account(self, mean: Plane, outer: Plane, push: Push | None) -> None:
-        """Add the external work and impulse of a time step, with the mean velocities over it."""
+        """Add the external work and impulse of a time step, computed with the mean velocities over the step."""
         accounts = self.accounts
         dt = self.dt
         momenta = self.structure.masses * mean

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Results are computed for this many states at once, because calling numpy for single states would be slow.
+# Number of states for which results are computed at once, because calling numpy for single states would be slow.
 _BLOCK: Final = 256
 
 # Default output interval [s], which gives 25 states per period of a 400 Hz mode.
 INTERVAL = 1e-4
 # Largest number of time steps, which take minutes; a request for more is probably a mistake.
 MOST_STEPS = 5_000_000
-# _FINE: time between values of tr in a scan while the load may last [s].
-# _COARSE: time between values of tr in the flight [s], six per energy period, which is 25 ms.
-# _LAST: time before td in which no tr is scanned [s].
+# _FINE: interval between values of tr in a scan while the load may last [s].
+# _COARSE: interval between values of tr in the flight [s]; it gives six values per energy period of 25 ms.
+# _LAST: duration before td in which no tr is scanned [s].
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
@@ -80,7 +80,7 @@ class Record(NamedTuple):
 
     @property
     def total_energy(self) -> Values:
-        """Sum of current and dissipated energy (n,) [J], as in a solver, but excluding the energy lost at tr."""
+        """Sum of current and dissipated energy, shape (n,) [J], as in a solver, but without the energy lost at tr."""
         present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
             present + self.friction_energy + self.wall_energy + self.damping_energy
@@ -88,7 +88,7 @@ class Record(NamedTuple):
 
     @property
     def energy_ratio(self) -> Values:
-        """Ratio of the total energy to the sum of initial energy and external work (n,) [-]; 1 if both are 0."""
+        """Ratio of the total energy to the sum of initial energy and external work, shape (n,) [-]; 1 if both are 0."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
         return np.asarray(
             np.divide(
@@ -101,7 +101,7 @@ class Record(NamedTuple):
 
     @property
     def imbalance(self) -> Values:
-        """Error of the energy balance as a fraction of the largest total energy (n,) [-]."""
+        """Error of the energy balance as a fraction of the largest total energy, shape (n,) [-]."""
         total = self.total_energy + self.lost_energy
         return np.asarray(
             (total - total[0] - self.external_work + self.external_work[0])
@@ -150,7 +150,7 @@ class Recorder:
             self._work_out()
 
     def _work_out(self) -> None:
-        """Compute the results of the states stored since the last block was full."""
+        """Compute the results of the states stored since the last full block."""
         count = (self._next - 1) % _BLOCK + 1
         states = slice(self._next - count, self._next)
         s = self._motion.structure
@@ -222,7 +222,7 @@ class Recorder:
 
 
 def _count_updates(motion: BoxMotion) -> int:
-    """Return how many bar forces have been computed so far."""
+    """Return the number of evaluations of bar forces so far."""
     return motion.box.evaluations + motion.step.evaluations
 
 
@@ -261,7 +261,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # Overflow warnings are not needed, because an overflow would make the number of time steps too large below.
+    # Overflow warnings are suppressed, because an overflow would make the number of time steps too large below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -284,7 +284,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid = {motion.step_at(window.tr): window for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
-    # Floating-point warnings are not needed, because the recorder raises an error for infinite numbers.
+    # Floating-point warnings are suppressed, because the recorder raises an error for infinite numbers.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
@@ -366,7 +366,7 @@ class Outcome(NamedTuple):
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Return times for tr up to td [s], dense until 1.5 times the end of the load and then resolving the vibration.
+    """Return times for tr up to td [s], dense until 1.5 times the end of the load, and then resolving the vibration.
 
     Raises RangeError if td leaves no time for tr.
     """
@@ -382,7 +382,7 @@ def scan_times(released: float, td: float) -> list[float]:
 
 
 def find_comparison_end(reference: Record, td: float) -> float:
-    """Return when the comparison after ``td`` ends: at the landing or the end of the record [s].
+    """Return the time at which the comparison after ``td`` ends: the landing or the end of the record [s].
 
     Raise RangeError if ``td`` is not before that time.
     """

@@ -1,26 +1,19 @@
-"""Write the verdict on a pair of times: what to do, why, what to expect after td, and how to improve it."""
+"""Write the verdict on a pair of times: what to do, why, what to expect after td, and how to improve the pair."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from d2rpick.choice.pair.grades import GOOD
-from d2rpick.report.tables import quote_shell_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Grade
-    from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import History
 
     Lines = list[tuple[str, str]]
-
-# Formats of tables, and the column of a table that is read as the energy without being named.
-_TABLES: Final = ("csv", "hdf5")
-_USUAL_ENERGY: Final = "internal_energy"
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
@@ -34,36 +27,8 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
     return [*lines, ("expect", describe_expectation(decision))]
 
 
-def name_card_command(
-    history: History, settings: Settings, windows: Sequence[tuple[float, float]]
-) -> str:
-    """Return the options or the command that prints the card of windows, with what the card needs besides."""
-    from d2rpick.deck.printing import SOLVERS, find_solver
-
-    if SOLVERS[find_solver(history.format)].switches == "node":
-        # The deck names the main nodes of the rigid bodies that contain the parts.
-        if history.parts and settings.bodies is not None:
-            return "-f card"
-        return "-f card --node IDS (the main nodes of the rigid bodies)"
-    if history.parts:
-        return "-f card"
-    # The parts of the card are not those of the energy, which `card` can tell apart.
-    times = [
-        text
-        for tr, td in windows
-        for text in ("--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
-    ]
-    if history.format in _TABLES and history.channel != _USUAL_ENERGY:
-        energy = ["--energy", history.channel]
-    else:
-        energy = []
-    names = [text for name in history.source for text in ("--history", name)]
-    words = ["d2rpick", "card", *times, "--part", "IDS", *energy, *names]
-    return f"{quote_shell_line(words)} (IDS: the parts to switch)"
-
-
 def describe_expectation(decision: Decision) -> str:
-    """Return the expected error after td, and the largest error that is possible."""
+    """Return the expected error after td, and the largest possible error, as text."""
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
@@ -71,7 +36,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and a sentence on the vibration; both omit what the verdict already says."""
+    """Return a sentence on the motion and a sentence on the vibration, without what the verdict already states."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -90,17 +55,23 @@ def list_statements(decision: Decision) -> Lines:
 
 
 def explain_grade(grade: Grade, decision: Decision) -> str:
-    """Return why a grade is not better and how to improve it, unless the verdict already says so."""
+    """Return why a grade is not better and how to improve it, unless the verdict already states this."""
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
-    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, causes)))
     reasons = "; ".join(cause.reason for cause in causes)
-    return f". Reason: {reasons}. To improve: {cures}"
+    # A better pair is the cure that the verdict names.
+    curable = [
+        cause
+        for cause in causes
+        if not (decision.better is not None and cause.needs_other_times)
+    ]
+    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, curable)))
+    return f". Reason: {reasons}{f'. To improve: {cures}' if cures else ''}"
 
 
 def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
-    """Number the reasons why verdicts are not better, so that each reason can be explained once below a table."""
+    """Number the reasons why verdicts are not better, so that each reason is explained only once below a table."""
     reasons = (
         decision.general_reason for decision in decisions if decision.grade != GOOD
     )
@@ -129,12 +100,12 @@ def format_in_full(decision: Decision) -> str:
 
 
 def format_rigid_time(best: Candidate) -> str:
-    """Return how long the parts are rigid."""
+    """Return the time for which the parts are rigid, as text."""
     return f"{best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the simulated time"
 
 
 def format_accuracy(best: Candidate) -> str:
-    """Return the accuracy and the timing tolerance of tr as text; an empty string if neither is known."""
+    """Return the accuracy and the timing tolerance of tr as text; empty if neither is known."""
     interval = (
         "" if best.tr_high is None else f"accurate to ±{best.tr_high - best.tr:.1g}"
     )
@@ -152,5 +123,5 @@ def format_saving(best: Candidate) -> str | None:
 
 
 def format_saved_share(run_time_share: float) -> str:
-    """Return how much CPU time is saved if the run takes the share ``run_time_share`` of the CPU time."""
+    """Return how much CPU time is saved if the run takes the fraction ``run_time_share`` of the CPU time."""
     return f"about {1 - run_time_share:.0%} of the CPU time"

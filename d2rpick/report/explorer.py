@@ -51,7 +51,7 @@ _OVERVIEW: Final = 200
 # Separator between the section, the chart of the motion and the values of a pair in ``explorer.html``.
 _NEXT: Final = "<!-- next -->"
 
-# Labels of the values shown for a pair, by key and in display order.
+# Labels of the values shown for a pair, keyed by value name and in display order.
 _VALUES: Final[Mapping[str, str]] = {
     "verdict": "verdict",
     "why": "why",
@@ -68,7 +68,7 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "admissible tr",
     "reason": "no tr",
 }
-# Number of columns into which the view is divided to draw windows of acceptable tr. It must be a multiple of 8.
+# Number of columns into which the view is divided to draw windows of acceptable tr; it must be a multiple of 8.
 _COLUMNS: Final = 480
 # Number of significant digits with which a difference is shown.
 _READ: Final = 3
@@ -88,7 +88,7 @@ def read_scripts() -> tuple[Markup, ...]:
 
 
 def build_explorer(explored: Explorer | None) -> Markup:
-    """Return the interactive section and its data, or nothing if there is nothing to explore.
+    """Return the interactive section and its data; empty if there is nothing to explore.
 
     The section is hidden until its script has checked that it can run.  Charts and values stand in two columns; on a
     narrow page the style sheet puts them below each other in another order.
@@ -98,7 +98,7 @@ def build_explorer(explored: Explorer | None) -> Markup:
     flights = [_describe_flight(trade_off) for trade_off in explored.trade_offs]
     known_values = {
         name for flight in flights for name in flight["texts"]
-    }  # Values that are unknown for all pairs are left out.
+    }  # Values that are unknown for all pairs are omitted.
     listed = (
         make_element(
             "div", make_element("dt", name), make_element("dd", data_value=key)
@@ -147,7 +147,7 @@ def _strip_whitespace(text: str) -> str:
 
 
 def _build_data_element(name: str, content: Any) -> Markup:
-    """Return a data element for a script: JSON in which nothing can be mistaken for markup."""
+    """Return a data element for a script: JSON without anything that could be mistaken for markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
@@ -227,7 +227,7 @@ def _round_curve(values: Samples) -> list[float]:
 
 
 def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
-    """Return one row per td under a single header: ``numbers`` are drawn as curves, ``texts`` are shown next to them.
+    """Return one row per td, with a common header: ``numbers`` are drawn as curves, ``texts`` are shown next to them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """
@@ -268,7 +268,7 @@ def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[st
 
 
 def _compute_saved_percentage(offer: Offer) -> float | None:
-    """Return the share of the CPU time that a pair saves [%]; if part costs are unknown, the rigid share of the run."""
+    """Return the CPU time that a pair saves [%] or, if part costs are unknown, the rigid fraction of the run [%]."""
     share = offer.saving
     if offer.best and share is None:
         share = offer.best.rigid_fraction
@@ -276,7 +276,7 @@ def _compute_saved_percentage(offer: Offer) -> float | None:
 
 
 def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty if there is no window.
+    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty without windows.
 
     The mask has the same length for any number of windows, of which noise makes many, and is finer than a screen.
     """
@@ -300,7 +300,7 @@ def _round_number(value: float | None) -> float | None:
 
 
 def _name_error(offers: Sequence[Offer]) -> str:
-    """Return the name of the error by which the offers are compared."""
+    """Return the name of the error by which the proposed pairs are compared."""
     if all(offer.basis == "energy" for offer in offers):
         return "shortfall of the level at td"
     return "residual"
@@ -317,7 +317,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 def _list_texts(
     offer: Offer, decision: Decision | None, start: Offer, unit: str
 ) -> dict[str, str | None]:
-    """Return all texts shown for a td, worded like those of ``suggest --td``; unknown values give None."""
+    """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
     best = offer.best
     return {
         "td": format_short(offer.td),
@@ -339,7 +339,7 @@ def _list_texts(
 def _list_texts_of_best(
     offer: Offer, best: Candidate, unit: str
 ) -> dict[str, str | None]:
-    """Return the texts about the recommended tr."""
+    """Return the texts about the recommended tr of a td."""
     kept_share = offer.answer.mean_energy_bounds
     windows = offer.answer.windows
     return {
@@ -362,7 +362,7 @@ def _list_texts_of_best(
 
 
 def _format_for_screen_reader(offer: Offer) -> str:
-    """Return the quality as a sentence for screen readers."""
+    """Return the grade of a pair as a sentence for screen readers."""
     best = offer.best
     if best is None:
         return "no admissible tr"
@@ -372,7 +372,7 @@ def _format_for_screen_reader(offer: Offer) -> str:
 
 
 def _compare_offers(offer: Offer, start: Offer, unit: str) -> str:
-    """Describe the advantages and disadvantages of an offer compared with the offer that is shown first."""
+    """Describe the advantages and disadvantages of a proposed pair relative to the pair shown first."""
     if offer is start:
         return ""
     apart = offer.td - start.td

@@ -34,7 +34,7 @@ class Kind(NamedTuple):
     def of_part(
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
-        """Return the fields with these ``keys``, or all fields, to be read from the object that ``part`` returns."""
+        """Return the fields with these ``keys``, or all fields, read from the object that ``part`` returns."""
         return [_read_from_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:
@@ -62,7 +62,7 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Return the value of this field in an object, in its JSON form."""
+        """Return the value of this field in an object, converted to its JSON form."""
         return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
@@ -87,7 +87,7 @@ def row(
     closed: bool = False,
     **keywords: Any,
 ) -> Kind:
-    """Make a row of fields. A row that is ``closed`` allows no other keys.
+    """Make the kind of an object with these fields. An object that is ``closed`` allows no other keys.
 
     Results of older versions may lack the keys in ``later``; other ``keywords`` are added to the schema unchanged.
 
@@ -116,7 +116,7 @@ def row(
 
 
 def get_kind(kind: Kind | Name, **limits: Any) -> Kind:
-    """Return a kind by its name, with limits given as in JSON schema, such as ``minimum=0``."""
+    """Return a kind by its name, with limits as in JSON schema, such as ``minimum=0``."""
     named_kind = _KINDS[kind] if isinstance(kind, str) else kind
     if limits:
         return Kind({**named_kind.schema, **limits}, named_kind.plain, named_kind.name)
@@ -150,7 +150,7 @@ def many(kind: Kind | Name) -> Kind:
 
 
 def each(kind: Name) -> Kind:
-    """Return the kind of an object with arbitrary keys, whose values all have the given kind."""
+    """Return the kind of an object with arbitrary keys whose values all have the given kind."""
     return Kind({"type": "object", "additionalProperties": get_kind(kind)}, dict)
 
 
@@ -190,7 +190,7 @@ class Document(NamedTuple):
 
     @property
     def whole(self) -> Kind:
-        """A row of all fields of the document."""
+        """The kind of an object with all fields of the document."""
         head = (
             Field("schema", Kind({"const": self.name})),
             Field("tool_version", "text"),
@@ -206,7 +206,7 @@ class Document(NamedTuple):
         return row(*head, *self.row.fields, later=later, **further_keys)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
-        """Return the content of the JSON document; ``command`` lists the arguments that repeat the answer."""
+        """Return the content of the JSON document; ``command`` contains the arguments that repeat the answer."""
         head = {
             "schema": self.name,
             "tool_version": __version__,
@@ -217,7 +217,7 @@ class Document(NamedTuple):
     def as_json(
         self, answer: Any, command: Sequence[str], indent: int | None = 2
     ) -> str:
-        """Write an answer in its schema, as one line (newline-delimited JSON) if ``indent`` is not given."""
+        """Write an answer according to its schema, as one line (newline-delimited JSON) if ``indent`` is not given."""
         return tables.as_json(self.of(answer, command), indent)
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "svg", "pdf")
-# Palette of Okabe and Ito, distinguishable with any colour vision.
+# Palette of Okabe and Ito, whose colours can be distinguished with any colour vision.
 REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#000000",
     "#d55e00",
@@ -35,18 +35,18 @@ REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
     "#56b4e9",
     "#0072b2",
 )
-# Colour of items that have no verdict, such as admissible times and rigid windows of a finished run.
-# Green, yellow and red are used for verdicts.
+# Colour of items without a verdict, such as admissible times and rigid windows of a finished run.
+# Green, yellow and red are not used here, because they stand for verdicts.
 NEUTRAL: Final = "#595959"
 # Width of a figure in a file [inch].
 WIDTH: Final = 10.0
-# Largest width of the label of a switch time, as a share of the axes; True stands for a page, False for a file.
+# Largest width of the label of a switch time, as a fraction of the axes [-]; the key is True for a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# If the largest value is at least this many times the smallest, a logarithmic axis has marks only at powers of ten.
+# Smallest ratio of largest to smallest value at which a logarithmic axis has marks at powers of ten only [-].
 _DECADES: Final = 100.0
 # Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
 STRETCHES: Final = 400
-# Largest number of letters of a name in a legend; a longer name from a file is shortened.
+# Largest number of letters of a name in a legend; longer names from files are shortened.
 _LONGEST_NAME = 28
 
 # Width of a figure on a page [inch], chosen so that its letters on a phone are as large as those of the text.
@@ -73,7 +73,7 @@ class Figure(figures.Figure):
 
 
 def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]:
-    """Create a figure of axes below each other with a common time axis; ``height`` is its height in a file [inch]."""
+    """Create a figure with axes below each other and a common time axis; ``height`` is its height in a file [inch]."""
     figure = Figure(figsize=(WIDTH, height), layout=None if page else "constrained")
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
@@ -85,7 +85,7 @@ def mark_span(
     colour: str = FLIGHT,
     alpha: float = 0.15,
 ) -> None:
-    """Shade a span of times, by default in the colour of a flight."""
+    """Shade a time span, by default in the colour of a flight."""
     axes.axvspan(*span, color=colour, alpha=alpha, linewidth=0, label=label)
 
 
@@ -96,13 +96,13 @@ def note(
     offset: tuple[float, float],
     **look: Any,
 ) -> None:
-    """Write a string at ``place`` (time, height as a share of the axes), moved by ``offset`` points."""
+    """Write a string at ``position`` (time, height as a fraction of the axes), moved by ``offset`` points."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
     axes.annotate(text, position, xytext=offset, textcoords="offset points", **look)
 
 
 def choose_picture_format(name: str) -> str:
-    """Return the picture format that the suffix of ``name`` denotes; raise FormatError unless it is png, svg or pdf."""
+    """Return the picture format for the suffix of ``name``; raise FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
         raise FormatError(
@@ -123,14 +123,14 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def ignore_missing_letters() -> Iterator[None]:
-    """Draw letters that the font lacks as boxes, and suppress the warning about them."""
+    """Draw letters missing in the font as boxes, and suppress the warning about them."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
 
 
 def make_logarithmic(axes: Axes, low: float, high: float) -> None:
-    """Make the vertical axis logarithmic, with plain numbers: typesetting powers takes a third of a figure's time."""
+    """Make the vertical axis logarithmic, with plain numbers, because typesetting powers would take much time."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     if high > _DECADES * low:
@@ -180,7 +180,7 @@ def show_span(
 def mark_times(
     panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool
 ) -> None:
-    """Mark the switch times. Their labels are above the first axes, away from each other and from the edges.
+    """Mark the switch times. Their labels are above the first axes, clear of each other and of the edges.
 
     A label that would cross an edge moves to the other side of its line if there is room.
     """
@@ -229,7 +229,7 @@ def format_axes(axes: Axes, *, legend: bool = True) -> None:
 
 
 def _collect_legend_entries(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """Return the legend entries of several panels, each name once."""
+    """Return the legend entries of several panels, each name only once."""
     panel_entries = (
         zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
     )
@@ -319,7 +319,7 @@ def _place(
 
 
 def render_svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Return a figure as an SVG element for a page. All its ids begin with ``prefix``; text is not drawn as outlines.
+    """Return a figure as an SVG element for a page. Its ids begin with ``prefix``; text is not drawn as outlines.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """

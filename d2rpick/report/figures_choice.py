@@ -56,19 +56,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Heights of a figure [inch]: with the energy only, and with the motion too. On a page they belong to each panel.
+# Heights of a figure [inch]: with the energy only, and with the motion too. On a page, they apply to each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Largest number of candidates drawn as marks; more are drawn as a band of admissible tr.
+# Largest number of candidates that are drawn as marks; more candidates are drawn as a band of admissible tr.
 _FEW: Final = 20
-# Height of the band at the bottom of the axes, as a share of the axes. The curve lies above the band.
+# Height of the band at the bottom of the axes, as a fraction of the axes [-]; the curve lies above the band.
 _BAND: Final = 0.045
-# Time shown before and after the flights of a plan, as a share of their span.
+# Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# The label of a window contains its times if the window is at least this share of the simulated time.
+# Smallest length of a window whose label contains its times, as a fraction of the simulated time [-].
 _ROOM_FOR_TIMES: Final = 0.2
 
-# Colours of the windows in a plan, by verdict or state.
+# Colours of the windows in a plan, keyed by verdict or state.
 _COLOURS: Final = {
     "use": GOOD,
     "use with care": "#e69f00",
@@ -82,23 +82,23 @@ _HATCHES: Final = {
     "do not use": "xx",
     "re-plan": "//",
     "done": None,
-}  # Hatches distinguish the windows in print without colours.
+}  # Hatches distinguish the windows in black-and-white print.
 # _PLAN_HEIGHT: height of the figure of a plan in a file [inch].
-# _PLAN_PANEL: height of the axes of that figure on a page [inch].
+# _PLAN_PANEL: height of the axes in the figure of a plan on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn.
+# Height of the strip below the energy in which the windows are drawn, as a fraction of the axes [-].
 _STRIP: Final = 0.07
-# Height of the energy axis, as a multiple of the largest energy shown.
+# Height of the energy axis, as a multiple of the largest energy shown [-].
 _HEADROOM: Final = 1.1
 # Largest number of parts whose energy is drawn.
 _MOST_PARTS: Final = 6
 # _TRADE_HEIGHT: height of the figure of ``explore`` in a file [inch].
-# _TRADE_PANEL: height of each axes of that figure on a page [inch].
+# _TRADE_PANEL: height of each axes in the figure of ``explore`` on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space before the first td and after the last td, as a share of the axes, so that marks there are not cut off.
+# Space before the first td and after the last td, as a fraction of the axes [-], so that marks there are complete.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Palette of Okabe and Ito, except yellow, which is hard to see on white. Dashes distinguish lines of one colour.
+# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of one colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,
@@ -109,25 +109,25 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Up to this number of runs, all are drawn in colour with a name; of more runs, only the outliers are.
+# Largest number of runs that are all drawn in colour with a name; of more runs, only the outliers are.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# _DARK: all grey curves together are at most as dark as this number of lines.
+# _DARK: number of lines that are together as dark as all grey curves may be.
 # _FAINTEST: smallest opacity of a grey curve [-].
 _DARK, _FAINTEST = 10, 0.02
-# If there are more runs than this number, their lines and marks are drawn thin.
+# Largest number of runs whose lines and marks are drawn thick.
 _MANY: Final = 40
-# _BEFORE: time shown before the first tr, as a share of the time from the first tr to td.
-# _AFTER: time shown after td, as a share of the time from the first tr to td.
+# _BEFORE: time shown before the first tr, as a fraction of the time from the first tr to td [-].
+# _AFTER: time shown after td, as a fraction of the time from the first tr to td [-].
 _BEFORE, _AFTER = 0.25, 0.15
 # Height of the figure of ``study`` in a file [inch].
 _HEIGHT: Final = 4.0
-# Height of a run's name, as a share of the axes.
+# Height of the name of a run, as a fraction of the axes [-].
 _LINE: Final = 0.055
 # The line that connects a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# The axis may omit the lowest level if the median level is more than this many times as high.
+# Largest ratio of the median level to the lowest level at which the axis still includes the lowest level [-].
 _LOWEST: Final = 50.0
 
 
@@ -147,7 +147,7 @@ def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
 
 
 def draw_verdict(answer: PairVerdict, *, page: bool = False) -> Figure:
-    """Draw the energy in the flight with the target energy and the judged pair; below it the motion after that pair.
+    """Draw the energy in the flight with the target energy and the judged pair; below it, the motion after that pair.
 
     With a finished switched run, its energy is drawn over that of the reference instead of the motion of a model.
     """
@@ -317,7 +317,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
     low = min(0.0, float(shown.min(initial=0.0)))
     high = _HEADROOM * float(shown.max(initial=0.0)) or 1.0
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    # There are no axis labels below zero energy, because only the windows are drawn there.
+    # The axis has no labels below zero energy, because only the windows are drawn there.
     axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
     _finish_run_axes(figure, axes, *_label_run_axes(history), page=page)
     return figure
@@ -331,7 +331,7 @@ def _name_window_kind(row: PlannedFlight) -> str:
 
 
 def _show_flights(axes: Axes, plan: RunPlan) -> None:
-    """Limit the time axis to the flights and a little before and after them."""
+    """Limit the time axis to the flights, with a little space before and after them."""
     if not plan.flights:
         return
     start = plan.flights[0].start
@@ -452,7 +452,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
 
 
 def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
-    """Draw one measure of all offers, with gaps if it is unknown, and mark the Pareto-optimal offers."""
+    """Draw one measure of all proposed pairs, with gaps for unknown values, and mark the Pareto-optimal pairs."""
     td = np.array([offer.td for offer in trade_off.offers])
     drawn = np.array([np.nan if value is None else value for value in values])
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
@@ -533,7 +533,7 @@ def _choose_named_runs(
 def _draw_others(
     axes: Axes, curves: Sequence[Samples], named_runs: Sequence[_Named]
 ) -> None:
-    """Draw the runs that have no name in grey, and the more faintly the more runs there are."""
+    """Draw the runs without names in grey; the more runs there are, the fainter they are drawn."""
     named_curves = {id(named_run.curve) for named_run in named_runs}
     other_curves = [curve.T for curve in curves if id(curve) not in named_curves]
     is_thin = len(curves) > _MANY
@@ -591,7 +591,7 @@ def _show_runs(
         np.concatenate([levels, *_select_energies(curves, *window)])
         for window in ((early, td), span)
     )
-    # The axis shows the lowest level too, unless it is far below the median level.
+    # The axis also shows the lowest level, unless it is far below the median level.
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = make_scale(float(inner.min()), float(visible_energies.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
@@ -639,7 +639,7 @@ def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> Non
 
 
 def _compute_height(axes: Axes, value: float) -> float:
-    """Return the height of a value in the axes, 0 at the bottom and 1 at the top."""
+    """Return the height of a value in the axes [-], from 0 at the bottom to 1 at the top."""
     bottom, top = axes.get_ylim()
     value = min(max(value, bottom), top)
     if axes.get_yscale() == "log":

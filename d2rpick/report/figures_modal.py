@@ -1,4 +1,4 @@
-"""Draw a vibration of several modes: the energy halfway between tr and td, and the residual of each tr."""
+"""Draw a vibration of several modes: the energy midway between tr and td, and the residual of each tr."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
-    """Mark the energy halfway between tr and td, which shows the relative direction of the two deformations."""
+    """Mark the energy midway between tr and td, which shows the relative direction of the two deformations."""
     middle = (tr + situation.td) / 2
     energy = situation.history.energy_at(middle)
     axes.scatter(
@@ -27,7 +27,7 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
 
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
-    """Draw the residual of each tr in the flight, and the residual of a run that does not vibrate after td."""
+    """Draw the residual of each tr in the flight, and the residual of having no vibration after td."""
     profile = situation.vibration.profile
     start = situation.earliest_tr
     assert profile is not None

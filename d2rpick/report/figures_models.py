@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Number of outlines of the rolling box, few enough to be distinguishable.
+# Number of outlines of the rolling box; it is small, so that the outlines can be distinguished.
 _OUTLINES = 8
 
 _SLED_LENGTH: Final = 1.6
@@ -62,7 +62,7 @@ def draw_rollover(
     switched: Record | None = None,
     windows: Sequence[RigidWindow] = (),
 ) -> Figure:
-    """Draw outlines of the box at regular times with sled, curb and ground, and roll and height over time.
+    """Draw outlines of the box at regular times with sled, curb and ground, and roll angle and height over time.
 
     ``switched`` is a run of the same box, rigid in ``windows``; if given, the difference of the two runs is drawn too.
     """
@@ -149,7 +149,7 @@ def _draw_outlines(
 
 
 def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
-    """Shade the rigid windows; mark the end of the sled's push and the start of the ground contact."""
+    """Shade the rigid windows; mark the end of the push by the sled and the start of the ground contact."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
         axes.axvspan(
@@ -215,7 +215,7 @@ def draw_scan(
 
 
 def _mark_times_of_scan(axes: Axes, reference: Record, answer: PairSuggestion) -> None:
-    """Mark the time in which the sled pushes, and the recommended tr."""
+    """Mark the time span in which the sled pushes the box, and the recommended tr."""
     if reference.released is not None:
         axes.axvspan(
             0,
@@ -236,7 +236,7 @@ def _mark_times_of_scan(axes: Axes, reference: Record, answer: PairSuggestion) -
 
 
 def draw_sled(axes: Axes, parameters: Parameters, position: float) -> None:
-    """Draw floor, curb and cushion of the sled at ``position`` [m], and the ground."""
+    """Draw the ground, and the sled at ``position`` [m] with its floor, curb and cushion."""
     p = parameters
     axes.axhline(-p.ground, color=REFERENCE, linewidth=1.2)
     if p.drop is not None:

@@ -12,6 +12,7 @@ from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import POOR
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -98,7 +99,7 @@ class Checks:
 
 
 def as_table(checks: Checks, _: DisplayOptions) -> str:
-    """Return one line per finding and per window of each deck, then the numbers of findings and of failed decks."""
+    """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step."""
     lines: list[str] = []
     for result in checks.results:
         lines.append(_format_path(result.deck, checks.root))
@@ -111,7 +112,43 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
             f"  {_format_finding(finding)}"
             for finding in _list_findings(checks, result)
         ]
-    return "\n".join([*map(make_printable, lines), "", _summarize_findings(checks)])
+    step = f"next  {_name_next_step(checks)}"
+    return "\n".join(
+        [*map(make_printable, lines), "", step, _summarize_findings(checks)]
+    )
+
+
+def _name_next_step(checks: Checks) -> str:
+    """Return what to do after the check, with a command that can be typed."""
+    serious = [
+        finding
+        for result in checks.results
+        for finding in _list_findings(checks, result)
+        if finding.severity is not Severity.INFO
+    ]
+    if serious:
+        explain = tables.quote_shell_line(("d2rpick", "rule", serious[0].rule))
+        return (
+            f"correct the deck where a line above says so; {explain} explains the first"
+        )
+    decks = tables.make_positional([result.deck for result in checks.results])
+    if not any(result.cards for result in checks.results):
+        return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
+    if checks.history is None:
+        command = tables.quote_shell_line(("d2rpick", "check", *decks))
+        return f"judge the times by the reference run: {command} --history HISTORY"
+    history = tables.make_positional(checks.history)
+    grades = [
+        window.decision.grade
+        for result in checks.results
+        for window in result.windows
+        if window.decision
+    ]
+    if POOR in grades:
+        plan = tables.quote_shell_line(("d2rpick", "plan", *history))
+        return f"choose other times with {plan}"
+    compare = tables.quote_shell_line(history)
+    return f"run the deck, and compare the run with d2rpick verify --switched SWITCHED_RUN {compare}"
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
@@ -245,7 +282,7 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _make_sarif_help(rule: Rule) -> dict[str, str]:
-    """Return the fix of a rule, and where the documentation explains the rule.
+    """Return the fix of a rule, and the place in the documentation that explains the rule.
 
     SARIF requires an absolute address as ``helpUri``.  The documentation has none, so the text names its page and
     anchor.
@@ -329,7 +366,7 @@ def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str
 
 
 def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
-    """Yield the windows in groups of the same cards, times and verdict."""
+    """Yield the windows in groups with the same cards, times and verdict."""
     alike = (
         (
             (window.cards, window.unit.kind, window.tr, window.td, window.decision),
@@ -396,7 +433,7 @@ def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
 
 
 def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
-    """Return the verdict on a pair, its reason and its cure by key; None if the pair was not judged."""
+    """Return the verdict on a pair, its reason and its cure, keyed by JSON key; None if the pair was not judged."""
     return {
         "verdict": decision and decision.verdict,
         "verdict_reason": decision and decision.reason,
@@ -481,7 +518,7 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display, with ``/`` and no undecodable bytes, relative to ``root`` if it is inside it."""
+    """Return a path for display, with ``/`` and no undecodable bytes; it is relative to ``root`` if inside it."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up
@@ -494,7 +531,7 @@ def _format_path(path: str, root: str) -> str:
 
 
 def _make_sarif_locations(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
-    """Return a location in a file as SARIF defines it."""
+    """Return a location in a file in the form that SARIF defines."""
     from urllib.parse import quote
 
     uri = f"{'file://' * displayed.startswith('/')}{quote(displayed)}"
@@ -508,7 +545,7 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Replace the characters of a string that XML 1.0 cannot contain or a terminal does not show."""
+    """Replace the characters of a string that XML 1.0 cannot contain or that a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
@@ -574,7 +611,7 @@ def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
 
 
 def _format_example(title: str, example: Example, width: int) -> Iterator[str]:
-    """Return the lines of an example deck, of its included files, and of the files that it is checked against."""
+    """Return the lines of an example deck, of its included files, and of the files with which it is compared."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.wrap_command(

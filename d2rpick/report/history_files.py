@@ -1,4 +1,4 @@
-"""Write histories of the sample models to files: as tables with any columns, or as solver databases."""
+"""Write histories of the sample models to files: as tables with arbitrary columns, or as solver databases."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 Table = dict[str, "Samples"]
 
-TABLES: Final = ("csv", "hdf5")  # Formats that hold columns with any names.
+TABLES: Final = ("csv", "hdf5")  # Formats whose columns can have arbitrary names.
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
 
 
 def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
-    """Return the format for a file name, csv if there is no name; raise FormatError if the name determines none.
+    """Return the format for a file name, csv if there is no name; raise FormatError if the name implies no format.
 
     The suffix determines the format.  A name that has no known suffix must be or contain the name of a solver's
     database.
@@ -49,7 +49,7 @@ def choose_history_format(name: str | None, formats: Sequence[str]) -> str:
 
 
 def write_table(form: str, columns: Table) -> bytes:
-    """Write columns (n,) in one of the formats of `TABLES`."""
+    """Write columns of shape (n,) in one of the formats of `TABLES`."""
     return cast("bytes", load_reader(form).write(columns))  # type: ignore[attr-defined]
 
 
@@ -163,7 +163,7 @@ def _list_writers(
     glstat: Callable[..., bytes],
     matsum: Callable[..., bytes],
 ) -> Mapping[str, Callable[..., bytes]]:
-    """Return the function that writes each format, given functions that make a table, a glstat or a matsum."""
+    """Return the function that writes each format, keyed by format, given functions that make each kind of table."""
     tables = {
         form: lambda run, *_, form=form: write_table(form, table(run))
         for form in TABLES

@@ -94,7 +94,7 @@ OSCILLATOR: Final = row(
     Field("reason", "text?"),
     name="oscillator",
 )  # fmt: skip
-# JSON fields with the position error of a rigid body at td, which is estimated from the motion of its parts
+# JSON fields with the position error of a rigid body at td, which is estimated from the motion of its parts.
 _POSITION: Final = (
     Field("position_error", "size?",
           "position error of a rigid body at td, caused by a part that is frozen in another position [length]; for "
@@ -109,11 +109,11 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Deprecated keys of single parts, which are null for one version before they are removed, as users may read them.
+# Kind of deprecated keys of single parts; they are null for one version before removal, as users may read them.
 _NO_VALUE: Final = Kind({"type": "null"})
 NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
                         "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
-# All values of a candidate. Add a new measure at the end, so that the columns of CSV files keep their order.
+# All values of a candidate. New measures are added at the end, so that the columns of CSV files keep their order.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -162,7 +162,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# _OF_TR: keys that explain how tr was chosen but do not rate the pair.
+# _OF_TR: keys that explain how tr was chosen, but do not rate the pair.
 # _FIRST: keys of the ratings that ``verify`` shows first, in this order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
@@ -190,7 +190,7 @@ MEASURES: Final = (
     *_FIRST,
     *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
 )
-# Keys that older results of ``suggest`` and ``verify`` lack.
+# Keys that are missing in older results of ``suggest`` and ``verify``.
 LATER: Final = (
     "run_time_share",
     "same_swing",
@@ -284,14 +284,14 @@ class Read(Protocol):
 
     @property
     def name(self) -> str:
-        """The file name as given by the user."""
+        """File name as given by the user."""
 
     def sha256(self) -> str:
         """Return the SHA-256 digest of the content."""
 
 
 def _list_files_once(files: Iterable[Read]) -> dict[str, Read]:
-    """Return the files by name. A file that is included twice is listed once."""
+    """Return the files, keyed by name. A file that is included twice is listed once."""
     return {file.name: file for file in files}
 
 
@@ -320,7 +320,7 @@ def _get_weights(answer: Any) -> Weights | None:
     return used.weights if used else None
 
 
-# The JSON output of every answer about a history begins with these fields.
+# Fields at the beginning of the JSON output of every answer about a history.
 FRAME: Final = (
     WARNINGS,
     Field("history", HISTORY, get=lambda answer: _get_history_holder(answer).history),
@@ -334,7 +334,7 @@ FRAME: Final = (
 
 
 def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Return the fitted oscillator; None if no oscillator was fitted."""
+    """Return the fitted oscillator as JSON values; None if no oscillator was fitted."""
     fit = situation.evidence.fit
     if fit is None:
         return None
@@ -349,7 +349,7 @@ def _get_oscillator(situation: Situation) -> dict[str, Any] | None:
 
 
 def _get_modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Return the modes on which the choice is based; None if it is not based on modes."""
+    """Return the modes on which the choice is based as JSON values; None if it is not based on modes."""
     modal = situation.vibration.modal
     return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 

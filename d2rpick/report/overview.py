@@ -92,7 +92,7 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
     Field("verdict_reason", "text", "reason for the verdict, as text", lambda overview: overview.reason, later=True),
     Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are in the files", later=True),
 ))  # fmt: skip
-# At most this number of times is listed for a contact that acts often.
+# Largest number of times that are listed for a contact that acts often.
 _MOST_TIMES: Final = 4
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output whose value is neither a list nor an object.
@@ -135,7 +135,8 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines = [("verdict", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
-        cure = None if overview.unjudged else overview.should_write
+        is_known = overview.unjudged or overview.rigid
+        cure = None if is_known else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []
@@ -145,7 +146,7 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
 
 
 def _list_selection_options(overview: Overview) -> Iterator[str]:
-    """Yield the options that select the same columns and parts; without chosen parts those that fly, or all."""
+    """Yield the options that select the same columns and parts; by default, they select the flying parts, or all."""
     selection = overview.selection
     if selection.time is not None:
         yield from ("--time", selection.time)
@@ -270,7 +271,7 @@ def _list_part_rows(overview: Overview) -> list[list[tables.Cell]]:
 
 
 def _format_force(force: ForceOverview) -> str:
-    """Return the name of a contact and the times in which it acts."""
+    """Return the name of a contact and the times at which it acts, as text."""
     times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
     when = f"acts from {list_names(times, most=_MOST_TIMES)}" if times else "never acts"
     return f"{force.name} {when}"

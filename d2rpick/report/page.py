@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# A page with at least this number of sections has a table of contents.
+# Smallest number of sections of a page with a table of contents.
 _LONG: Final = 4
-# A table with at most this number of columns fits on a narrow screen.
+# Largest number of columns of a table that fits on a narrow screen.
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
@@ -45,12 +45,12 @@ _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
-_MOST_FILES: Final = 20  # A page names at most this number of files of a deck.
+_MOST_FILES: Final = 20  # Largest number of files of a deck that are named on a page.
 # Labels of the lines on a page that the reader fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
-# CSS class of the card and the badge of each verdict.
+# CSS class of the card and the badge, keyed by verdict.
 CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
@@ -68,7 +68,7 @@ class PageSection(Markup):
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Return an element. In attribute names ``_`` stands for ``-``; a final underscore avoids a Python keyword.
+    """Return an element. In attribute names, ``_`` stands for ``-``; a final underscore avoids a Python keyword.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
-    """Join elements and strings into one."""
+    """Join elements and strings into one element."""
     return Markup(
         between.join(
             child if isinstance(child, Markup) else _replace_markup(child, quote=False)
@@ -183,7 +183,7 @@ def _make_section(title: str, *content: str) -> PageSection:
 
 
 def build_contents(content: Iterable[str]) -> Markup:
-    """Return a table of contents with links to the sections of a page; nothing if the page is short."""
+    """Return a table of contents with links to the sections of a page; empty if the page is short."""
     sections = [part for part in content if isinstance(part, PageSection)]
     if len(sections) < _LONG:
         return Markup()
@@ -205,7 +205,7 @@ def build_drawing(caption: str, svg: str) -> Markup:
 
 
 def build_remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """Return a list of reasons and warnings, or nothing if both are missing."""
+    """Return a list of reasons and warnings; empty if there are none."""
     lines = [make_element("li", reason) for reason in reasons]
     lines += [
         make_element("li", make_element("b", caution.code), f": {caution.message}")
@@ -244,7 +244,7 @@ def build_scrolling_table(
 def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Return a table that is not in a box, and in which the row ``marked`` is highlighted.
+    """Return a table without a scrolling box, in which the row ``marked`` is highlighted.
 
     Columns of numbers are right-aligned.  Lines break only at blanks, never within a number.
     """
@@ -285,7 +285,7 @@ def _build_cell(cell: Cell, attributes: Mapping[str, str]) -> Markup:
 
 
 def build_pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Return a list of names and descriptions, or nothing if it would be empty."""
+    """Return a list of names and descriptions; empty if there are none."""
     listed = [
         make_element("div", make_element("dt", name), make_element("dd", text))
         for name, text in rows
@@ -344,7 +344,7 @@ def build_refusal(reason: str) -> Markup:
 
 
 def get_title(run: OpenedRun) -> str:
-    """Return the title that the solver wrote, or else the name of the file."""
+    """Return the title of the run that the solver wrote, or else the name of the file."""
     return (
         next((database.title for database in run.databases if database.title), "")
         or run.name
@@ -428,7 +428,7 @@ def list_deck_digests(
 
 
 def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
-    """Return the digests of the deck that an answer uses; nothing if there is no deck."""
+    """Return the digests of the deck that an answer uses; empty if there is no deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
 
@@ -436,14 +436,14 @@ def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
 def build_evidence(
     situation: Situation, health: Health | None, record: PageContext
 ) -> Iterator[Markup]:
-    """Return the sections on the input, its health, the method, and how to repeat the answer."""
+    """Return the sections on the input, its health, the method, and the command that repeats the answer."""
     yield build_section("What was read", _build_input(situation, record.run))
     yield build_section("Health of the reference run", *_build_health(health))
     yield from build_method(record.command, "-" in record.run.sources)
 
 
 def build_method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
-    """Return the sections on the method of an answer, and how to repeat it."""
+    """Return the sections on the method of an answer, and on the command that repeats the answer."""
     folded = make_element(
         "details",
         make_element("summary", make_element("h2", "Method and limits")),

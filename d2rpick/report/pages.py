@@ -24,6 +24,7 @@ from d2rpick.report.decision import (
     list_verdict_lines,
 )
 from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
+from d2rpick.report.formats import RepeatedQuestion
 from d2rpick.report.page import (
     Explorer,
     Markup,
@@ -83,7 +84,7 @@ def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
 def _build_figure(
     prefix: str, caption: str, kind: str, *arguments: Any, **how: Any
 ) -> Markup:
-    """Draw a figure by the name of its kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
+    """Draw a figure of the given kind, with a caption, as an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
     drawn = getattr(figures_choice, f"draw_{kind}")(*arguments, **how)
@@ -231,7 +232,7 @@ def _build_verdict(answer: PairVerdict, record: page.PageContext) -> Iterator[Ma
 
 
 def _build_comparison(comparison: Comparison, files: Iterable[Source]) -> Markup:
-    """Return the comparison of the finished switched run with the reference."""
+    """Return the comparison of the finished switched run with the reference run."""
     title = "The switched run"
     listed = [
         ("compared", f"from td to {comparison.end:.6g}"),
@@ -313,6 +314,7 @@ def plan_page(
     command: Sequence[str],
     card: str | None,
     explored: Explorer | None = None,
+    question: RepeatedQuestion | None = None,
 ) -> str:
     """Write the page of ``plan``.
 
@@ -327,6 +329,8 @@ def plan_page(
         Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
         The flights of the plan.
+    question : RepeatedQuestion, optional
+        Words with which the next command asks about the same run.
     """
     cards = [_build_window_card(row, answer) for row in answer.supported]
     cards = cards or [page.build_refusal("No window of this run can be recommended.")]
@@ -344,7 +348,7 @@ def plan_page(
             build_pairs(
                 [
                     ("plan", plan.give_plan_sentence(answer)),
-                    *plan.list_next_steps(answer),
+                    *plan.list_next_steps(answer, question or RepeatedQuestion()),
                     *plan.list_plan_remarks(answer),
                 ]
             ),
@@ -384,7 +388,7 @@ def _build_window_card(row: PlannedFlight, answer: RunPlan) -> Markup:
 
 
 def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
-    """Write the page of ``study``; ``command`` are the arguments that repeat it."""
+    """Write the page of ``study``; ``command`` contains the arguments that repeat it."""
     caption = (
         "Internal energies of all runs, with the tr of each, the common one and td"
     )
@@ -462,7 +466,7 @@ def _list_input_files(answer: StudyOfRuns) -> str:
 
 
 def parts_page(answer: Parts, command: Sequence[str]) -> str:
-    """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
+    """Write the page of ``parts``; ``command`` contains the arguments that repeat the answer."""
     if answer.sets:
         sets = [
             build_section(
@@ -539,7 +543,7 @@ def _build_set_card(best: PartSet | None) -> Markup:
 
 
 def drive_page(answer: Driven, command: Sequence[str]) -> str:
-    """Write the page of ``drive``; ``command`` are the arguments that repeat the run."""
+    """Write the page of ``drive``; ``command`` contains the arguments that repeat the run."""
     from d2rpick.histories.names import Selection
 
     history = answer.run.history(Selection(parts=tuple(map(str, answer.deck.parts))))
@@ -587,7 +591,7 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
     )
 
 
-# For each kind of answer, the functions that return its sentences and the header and rows of its table.
+# Functions that return the sentences of an answer, and the header and rows of its table, keyed by kind of answer.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
@@ -630,7 +634,7 @@ _LOOKS: Final[
 }
 
 
-# For each kind of answer with numbered verdicts in its table, the reasons behind the numbers.
+# Functions that return the numbered reasons for the verdicts in a table, keyed by kind of answer.
 _REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
     "suggestion": lambda answer: suggestion.list_candidate_reasons(
         answer, answer.candidates[:_FEW_ROWS]
@@ -691,5 +695,5 @@ def _build_picture(figure: Figure) -> Markup:
 
 
 def _select_known_facts(facts: Iterable[tuple[str, Cell]]) -> list[tuple[str, Cell]]:
-    """Return only the facts whose values are known."""
+    """Return only the facts with known values."""
     return [fact for fact in facts if fact[1] is not None]

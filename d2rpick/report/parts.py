@@ -19,6 +19,8 @@ from d2rpick.report.fields import (
     row,
     write_csv,
 )
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -161,9 +163,9 @@ _SPARE: Final = (
     "rotation error [deg]",
     "energy scatter",
 )
-# Displayed verdicts on parts.
+# Displayed verdicts on parts, keyed by verdict.
 _VERDICTS: Final = {"switch": "make rigid", "keep": "no"}
-# Displayed names of the sets.
+# Displayed names of the sets, keyed by set name.
 _SET_NAMES: Final = {
     "all that may": "all eligible parts",
     "all but what moves": "all eligible parts but loose ones",
@@ -172,7 +174,7 @@ _SET_NAMES: Final = {
 
 
 def is_limited_by_no_part(part_set: PartSet) -> bool | None:
-    """Return True if no deformable part limits the time step."""
+    """Return True if no deformable part limits the time step; None if this is unknown."""
     return None if part_set.step_growth is None else isinf(part_set.step_growth)
 
 
@@ -246,7 +248,9 @@ DOCUMENT: Final = Document(
 
 def as_table(answer: Parts, display: DisplayOptions) -> str:
     """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
-    lines = tables.format_in_line(list_verdict_on_set(answer))
+    lines = tables.format_in_line(
+        (*list_verdict_on_set(answer), *list_next_step(answer, display.question))
+    )
     if answer.sets:
         lines += [
             "",
@@ -260,10 +264,12 @@ def as_table(answer: Parts, display: DisplayOptions) -> str:
     return "\n".join([*lines, "", *tables.format_in_line(below)])
 
 
-def as_markdown(answer: Parts, _: DisplayOptions) -> str:
+def as_markdown(answer: Parts, display: DisplayOptions) -> str:
     """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
     sets = [tables.as_markdown(*build_set_table(answer))] if answer.sets else []
-    above = tables.format_as_list(list_verdict_on_set(answer))
+    above = tables.format_as_list(
+        (*list_verdict_on_set(answer), *list_next_step(answer, display.question))
+    )
     below = tables.format_as_list(list_remarks(answer))
     return "\n\n".join(
         [*above, *sets, tables.as_markdown(*build_part_table(answer)), *below]
@@ -276,7 +282,7 @@ def as_csv(answer: Parts, _: DisplayOptions) -> str:
 
 
 def as_value(answer: Parts, _: DisplayOptions) -> str:
-    """Return the part ids of the recommended set in the form of ``--part``; nothing if no set is recommended."""
+    """Return the part ids of the recommended set in the form of ``--part``; empty if no set is recommended."""
     return ",".join(map(str, answer.recommended.parts)) if answer.recommended else ""
 
 
@@ -336,7 +342,7 @@ def build_set_table(
 
 
 def _format_position_error(part_set: PartSet) -> str:
-    """Return the position error of a set, and the assumption behind it."""
+    """Return the position error of a set as text, with the assumption behind it."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
@@ -357,7 +363,7 @@ def name_verdict(row: PartRow) -> str:
 
 
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
-    """Return which parts to make rigid, why, and the next command, as (name, sentence) pairs."""
+    """Return which parts to make rigid, why, and what that saves, as (name, sentence) pairs."""
     best = answer.recommended
     if best is None and answer.inventory is None:
         return [
@@ -393,15 +399,27 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
             f"--part {format_part_ranges(best.parts)}, {name_set(best)} ({bodies})",
         ),
         ("saves", saves),
-        (
-            "next",
-            f"d2rpick plan --part {format_part_ranges(best.parts)} with the same files",
-        ),
     ]
 
 
+def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
+    """Return the next command: to the plan with the recommended set, or to all td if its pair cannot be used."""
+    best = answer.recommended
+    if best is None:
+        parts: Sequence[str] = ()
+        command = "plan"
+        if answer.inventory is not None:
+            command = "info"
+            question = RepeatedQuestion(files=question.files)
+    else:
+        parts = [format_part_ranges(best.parts)]
+        is_refused = best.decision is not None and best.decision.verdict == DO_NOT_USE
+        command = "explore" if is_refused else "plan"
+    return [("next", write_command(question, command, new_parts=parts))]
+
+
 def _explain_no_part(answer: Parts) -> str:
-    """Return why no set was compared: of some parts it is unknown whether they can be switched, or none can be."""
+    """Explain why no set was compared: for some parts it is unknown whether they can be switched, or none can be."""
     unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
     if not unknown_rows:
         return "no part can be switched"
@@ -453,7 +471,7 @@ def list_page_remarks(answer: Parts) -> list[tuple[str, str]]:
 
 
 def format_count(count: int, noun: str) -> str:
-    """Return a count with its noun, in the plural unless it is 1."""
+    """Return a count with its noun, in the plural unless the count is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 

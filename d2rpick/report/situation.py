@@ -1,4 +1,4 @@
-"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
+"""Describe the common content of suggest and verify: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-# Largest number of parts that a line names. The JSON output contains all parts.
+# Largest number of parts that are named in a line; the JSON output contains all parts.
 _NAMED = 5
 
 
@@ -31,7 +31,7 @@ def describe_input(history: History) -> str:
 
 
 def name_energy(history: History) -> str:
-    """Return the name of the energy; if it belongs to many parts, only the first of them are named."""
+    """Return the name of the energy; if the energy belongs to many parts, only the first of them are named."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
     if len(parts) <= _NAMED:
         return history.channel
@@ -39,7 +39,7 @@ def name_energy(history: History) -> str:
 
 
 def label_energy(unit: str) -> str:
-    """Return the label of an axis of internal energy, with its unit if a file names it.
+    """Return the axis label of an internal energy, with its unit if a file names it.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def label_energy(unit: str) -> str:
 
 
 def label_deformation(unit: str) -> str:
-    """Return the label of an axis of deformation, the square root of an energy.
+    """Return the axis label of a deformation, which is the square root of an energy.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def name_evidence(source: str | None) -> str:
 
 
 def _describe_basis(situation: Situation) -> str:
-    """Return the basis of the choice, and the fitted oscillator."""
+    """Describe the basis of the choice, and the fitted oscillator."""
     fit = situation.evidence.fit
     vibration = situation.vibration
     mode = vibration.whole.mode
@@ -133,7 +133,7 @@ def _explain_level_alone(situation: Situation) -> str:
 
 
 def list_health_columns(health: Health) -> tuple[str, ...]:
-    """Return the column names of the health table. The first contains the time up to which the run was judged."""
+    """Return the column names of the health table. The first name contains the time up to which the run was judged."""
     return (
         "health" if health.until is None else f"health up to {health.until:.6g}",
         "this run",
@@ -152,7 +152,7 @@ class Measure(NamedTuple):
 
 
 def list_health_measures(health: Health) -> list[Measure]:
-    """Return all health measures of a run; the measures of its rigid window are last."""
+    """Return all health measures of a run; the measures of its rigid window come last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)

@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.pair.grades import VERDICTS
+from d2rpick.choice.pair.grades import GRADES, POOR, VERDICTS
 from d2rpick.choice.runs.study import (
     OK,
     StudyOfRuns,
@@ -28,6 +28,8 @@ from d2rpick.report.fields import (
     row,
     write_csv,
 )
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -112,7 +114,7 @@ _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
-# Newline-delimited JSON has a line for each run, which `d2rpick.api.studies` writes, and a last line.
+# Newline-delimited JSON has one line per run, written by `d2rpick.api.studies`, and a last line of common results.
 _CURVE: Final = get_kind(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
@@ -125,7 +127,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
+# Columns omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
 _SPARE: Final = ("+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -146,7 +148,11 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
         )
     ]
     outcome_lines = tables.format_in_line(
-        [*list_outcome(answer), *list_run_reasons(answer)]
+        [
+            *list_outcome(answer),
+            *list_run_reasons(answer),
+            *list_next_step(answer, display.question),
+        ]
     )
     return "\n".join(
         [
@@ -159,10 +165,14 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
     )
 
 
-def as_markdown(answer: StudyOfRuns, _: DisplayOptions) -> str:
+def as_markdown(answer: StudyOfRuns, display: DisplayOptions) -> str:
     """Return the common results of the runs, and the runs as a Markdown table."""
     outcome_lines = tables.format_as_list(
-        [*list_outcome(answer), *list_run_reasons(answer)]
+        [
+            *list_outcome(answer),
+            *list_run_reasons(answer),
+            *list_next_step(answer, display.question),
+        ]
     )
     listed = "\n".join(f"* {line}" for line in outcome_lines)
     return f"{listed}\n\n{tables.as_markdown(*build_run_table(answer))}"
@@ -224,13 +234,13 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without its name, or else the codes of its warnings; empty without either."""
+    """Return the message of a run without its name, or else the codes of its warnings; empty if it has neither."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 
 
 def name_target_energy(answer: StudyOfRuns) -> str:
-    """Return the header of the column with the energies at td, with the unit if all runs name the same one."""
+    """Return the header of the column of target energies, with the unit if all runs name the same unit."""
     return f"E(td) [{answer.energy_unit}]" if answer.energy_unit else "E(td)"
 
 
@@ -271,7 +281,7 @@ def _format_error_span(errors: Sequence[float]) -> str:
 
 
 def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return how many runs have the same content as another run; nothing if all runs differ."""
+    """Describe how many runs have the same content as another run; empty if all runs differ."""
     count = sum(len(group) - 1 for group in find_repeated_runs(answer.runs))
     if not count:
         return []
@@ -285,7 +295,7 @@ def _list_repetitions(answer: StudyOfRuns) -> list[tuple[str, str]]:
 
 
 def _count_verdicts(answer: StudyOfRuns) -> str:
-    """Count the runs with each verdict on their own pair."""
+    """Describe how many runs have each verdict on their own pair."""
     counts = Counter(row.verdict for row in answer.runs if row.verdict)
     counted = [
         f"{word} in {format_number_of_runs(counts[word])}"
@@ -318,8 +328,32 @@ def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
     ]
 
 
+def list_next_step(
+    answer: StudyOfRuns, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run."""
+    judged = [row for row in answer.runs if row.verdict and row.td is not None]
+    if not judged:
+        first = RepeatedQuestion(files=question.files[:1])
+        return [("next", f"look at the first run with {write_command(first, 'info')}")]
+    worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
+    of_worst = question._replace(files=(worst.source,))
+    if worst.quality == POOR or answer.common.tr is None:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"look at the first of the worst runs with {line}"
+    elif answer.td is None:
+        earliest = min(row.td for row in judged if row.td is not None)
+        line = write_command(question, "study", "--td", f"{earliest:.6g}")
+        step = f"choose one td for all runs, for example the earliest, with {line}"
+    else:
+        times = ("--tr", f"{answer.common.tr:.6g}", "--td", f"{answer.td:.6g}")
+        line = write_command(of_worst, "verify", *times)
+        step = f"judge the common pair in the worst run with {line}"
+    return [("next", step)]
+
+
 def describe_td(answer: StudyOfRuns) -> str:
-    """Return the td of all runs, or the range in which each run has its own td."""
+    """Describe the td of all runs, or the range in which each run has its own td."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     if answer.td is None:
@@ -328,7 +362,7 @@ def describe_td(answer: StudyOfRuns) -> str:
 
 
 def shorten_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Return the distinctive part of each name; the folders and file names common to all are left out.
+    """Return the distinctive part of each name, without the folders and file names common to all.
 
     Examples
     --------

@@ -16,10 +16,14 @@ from d2rpick.report.decision import (
     list_numbered_reasons,
     list_statements,
     list_verdict_lines,
-    name_card_command,
     number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
@@ -28,13 +32,20 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import AcceptableWindow, PairSuggestion
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.decision import Decision
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
-# A line of text lists at most this number of windows of acceptable tr.
+# Largest number of windows of acceptable tr that are listed in a line of text.
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
+)
+# A pair with the decision on it.
+_JUDGED_PAIR: Final = row(
+    *keys.PAIR.fields,
+    Field("verdict", keys.VERDICT),
+    Field("verdict_reason", "text"),
+    later=("verdict", "verdict_reason"),
 )
 # A candidate and the decision on it.
 CANDIDATE: Final = row(
@@ -48,14 +59,14 @@ CANDIDATE: Final = row(
     later=(*keys.LATER, "parts", "verdict", "verdict_reason", "cure"),
 )
 
-# _SPARE: columns that are omitted first if the table of candidates would be too wide.
+# _SPARE: columns that are omitted first if the table of candidates is too wide.
 # _IN_FULL: columns that are shown only with ``verbose``.
 _SPARE: Final = ("timing tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
 _IN_FULL: Final = ("rank", "kind", "+-", "frozen-deformation error")
 
 
 def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
-    """Return each candidate with the decision on it."""
+    """Return each candidate together with the decision on it."""
     return [
         (candidate, answer.decision_on(candidate)) for candidate in answer.candidates
     ]
@@ -71,6 +82,15 @@ def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | N
         {**window._asdict(), "recommended": has_recommended_tr(window, tr)}
         for window in windows
     ]
+
+
+def _judge_pair_at_better_td(answer: PairSuggestion) -> dict[str, Any] | None:
+    """Return the pair at a better td with the verdict of ``verify``."""
+    better, decision = answer.better_pair, answer.decision_on_better
+    if better is None or decision is None:
+        return None
+    pair = {"td": better.td, "tr": better.tr, "residual": better.residual}
+    return {**pair, "verdict": decision.verdict, "verdict_reason": decision.reason}
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -89,9 +109,9 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     *keys.QUALITY,
     keys.HEALTH,
     keys.EXPECTED,
-    Field("better_td", maybe(keys.PAIR), "pair at a better td; null if there is none, or if it is the recommended "
-                                         "pair",
-          lambda answer: answer.better_pair),
+    Field("better_td", maybe(_JUDGED_PAIR), "pair at a better td; null if there is none, or if it is the recommended "
+                                            "pair",
+          _judge_pair_at_better_td),
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),
 ))  # fmt: skip
@@ -105,7 +125,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
     above = list_situation_heading(answer.situation, verbose=display.verbose)
     listed = answer.candidates[: display.limit]
     lines = [
-        *tables.format_in_line((*list_verdict(answer), *list_next_step(answer))),
+        *tables.format_in_line(
+            (*list_verdict(answer), *list_next_step(answer, display.question))
+        ),
         "",
         *tables.format_in_line(
             (*list_evidence(answer), *list_alternatives(answer), *above)
@@ -126,7 +148,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
 
 def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
     """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
-    above = tables.format_as_list((*list_verdict(answer), *list_next_step(answer)))
+    above = tables.format_as_list(
+        (*list_verdict(answer), *list_next_step(answer, display.question))
+    )
     below = tables.format_as_list((*list_evidence(answer), *list_alternatives(answer)))
     table = tables.as_markdown(*_select_shown_candidates(answer, display))
     listed = answer.candidates[: display.limit]
@@ -137,7 +161,7 @@ def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
 def _select_shown_candidates(
     answer: PairSuggestion, display: DisplayOptions
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the first candidates; empty columns are left out."""
+    """Return the first candidates without empty columns, as header and rows."""
     head, rows = tables.select_known_columns(
         *build_candidate_table(answer, display.limit)
     )
@@ -175,7 +199,7 @@ def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def _judge_better_pair(answer: PairSuggestion, better: Pair) -> str:
-    """Return the better pair with its verdict; one that cannot be used is named only as such."""
+    """Describe the better pair with its verdict, or state that it cannot be used."""
     decision = answer.decision_on_better
     if decision is None:
         return f"{_format_times(better)}: {describe_improvement(answer, better)}"
@@ -200,21 +224,45 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     return lines
 
 
-def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return the next command if the pair can be used."""
+def list_next_step(
+    answer: PairSuggestion, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of a pair that can be used, otherwise to a better pair."""
     decision = answer.decision
-    if decision is None or decision.verdict == DO_NOT_USE:
-        return []
     situation = answer.situation
     pair = answer.recommended
-    windows = [(pair.tr, pair.td)] if pair else []
-    command = name_card_command(situation.history, situation.settings, windows)
-    return [
-        (
-            "next",
-            f"print the cards with {command}, or a page of the evidence with --report FILE",
+    if decision is None or pair is None or decision.verdict == DO_NOT_USE:
+        step = _name_step_after_refusal(answer, decision, question)
+    else:
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(pair.tr, pair.td)],
+            question,
+            "suggest",
+            flying=situation.flight.by_parts,
         )
-    ]
+    return [("next", step)]
+
+
+def _name_step_after_refusal(
+    answer: PairSuggestion, decision: Decision | None, question: RepeatedQuestion
+) -> str:
+    """Return the step after an answer without a pair that can be used."""
+    better = decision.better if decision else answer.clearly_better
+    judged = answer.decision_on_better
+    if decision is None and judged is not None and judged.verdict == DO_NOT_USE:
+        better = None
+    if answer.td_window is not None:
+        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+    elif decision is None and answer.situation.flight.start is not None:
+        otherwise = (
+            f"let d2rpick choose both times with {write_command(question, 'suggest')}"
+        )
+    else:
+        line = write_command(question, "explore", *question.times)
+        otherwise = f"compare other td with {line}"
+    return name_step_after_refusal(answer.situation, better, question, otherwise)
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:
@@ -257,7 +305,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_position_error(best: Candidate, *, deck: bool) -> str:
-    """Return the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
+    """Describe the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` shows which do)" if taken and not deck else ""
@@ -271,7 +319,7 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Return the rigid time given up for a better level or residual, and the improvement."""
+    """Describe the rigid time given up for a better level or residual, and the improvement."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:
@@ -289,7 +337,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the share of all."""
+    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the sum of all."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
@@ -358,14 +406,14 @@ def build_candidate_table(
 def list_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> list[tuple[str, str]]:
-    """Return the reasons of the verdicts on the listed candidates, each with its number in the table."""
+    """Return the reasons for the verdicts on the listed candidates, each with its number in the table."""
     return list_numbered_reasons(_number_candidate_reasons(answer, listed))
 
 
 def _number_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> dict[str, int]:
-    """Number the reasons why the verdicts on the listed candidates are not better."""
+    """Number the reasons that explain why the listed candidates are not rated higher."""
     return number_reasons(map(answer.decision_on, listed))
 
 

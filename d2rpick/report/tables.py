@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# _WORD: if a table is too wide, words longer than this (paths, lists of parts) are split.
-# _LEAST: if the table is still too wide, words longer than this are split too; no number is that long.
+# _WORD: if a table is too wide, words with more characters than this, such as paths, are split first.
+# _LEAST: if the table is still too wide, words with more characters than this are split; numbers are shorter.
 _WORD: Final = 32
 _LEAST: Final = 12
-# _NUMBER: pattern of a number, which is not treated as a formula.
+# _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
 # _FORMULA: pattern of a spreadsheet formula, which begins with =, +, -, @ or the full-width form of one of them.
 # A formula may follow a semicolon, because some spreadsheets use semicolons to separate the cells of a CSV file.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# A cell with more characters than this is treated as text; it is wrapped before any column is omitted.
+# Largest number of characters of a cell that is not wrapped; longer cells are wrapped before columns are omitted.
 _TEXT: Final = 20
 
 
@@ -44,7 +44,7 @@ def format_short(value: Cell) -> str:
 
 
 def format_measure(value: float | None) -> str:
-    """Format a share or an error with three decimals, such as 0.957; a dash if it is unknown.
+    """Format a fraction or an error with three decimals, such as 0.957; a dash if it is unknown.
 
     Examples
     --------
@@ -60,14 +60,14 @@ def format_if_known(value: float | None, form: str) -> str | None:
 
 
 def format_half_width(low: float | None, high: float | None) -> str | None:
-    """Return half the width of an interval as text, for use after +-; None if it is unknown."""
+    """Return half the width of an interval as text, for use after +-; None if the width is unknown."""
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
 def select_known_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Leave out the columns in which no value is known.
+    """Drop the columns without any known value.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def as_text(
 
 
 def wrap_lines(text: str, width: int) -> str:
-    r"""Wrap the lines that are longer than ``width``; continuations are indented to the text after the name.
+    r"""Wrap the lines longer than ``width``; continuation lines are indented to the text after the name.
 
     Examples
     --------
@@ -240,7 +240,7 @@ def _wrap_below_name(line: str, width: int) -> str:
 def _reduce_widths(
     texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
 ) -> list[int]:
-    """Reduce the widest columns until a table fits: wrap column names first, then cells, and at last split words."""
+    """Reduce the widest columns until a table fits: wrap column names first, then cells, and finally split words."""
     narrowed = list(widths)
     names, *cells = (
         [min(_WORD, max(map(len, text.split()), default=1)) for text in row]

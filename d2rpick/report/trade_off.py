@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -13,13 +14,18 @@ from d2rpick.report.decision import (
     number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import describe_input
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.td.trade_off import Offer, TradeOff
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 OFFER: Final = row(
     Field("td", "number"),
@@ -49,13 +55,13 @@ COLUMNS: Final = [
 ]
 
 
-# A smaller relative change of the rigid time is not mentioned.
+# Smallest change of the rigid time that is mentioned, relative to the rigid time [-].
 _NO_CHANGE: Final = 5e-4
-# An error that falls to a share between these limits is described as halved; a smaller share is given as a number [-].
+# Error ratios between which an error is described as halved [-]; smaller ratios are given as numbers.
 _HALF: Final = (0.45, 0.5)
 
 
-# Columns that are omitted first if the table would be too wide.
+# Columns that are omitted first if the table is too wide.
 _SPARE: Final = (
     "timing tolerance",
     "level error",
@@ -70,7 +76,7 @@ _NOT_HALVED: Final = "No other td in the range halves this error without giving 
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the verdict with other choices, the Pareto-optimal offers, the reasons of verdicts, and the input."""
+    """Return the verdict with other choices, the Pareto-optimal pairs, the reasons for verdicts, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -83,7 +89,12 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     low, high = trade_off.td_window
     window = f"{len(trade_off.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
-        *tables.format_in_line(list_answer_lines(trade_off)),
+        *tables.format_in_line(
+            (
+                *list_answer_lines(trade_off),
+                *list_next_step(trade_off, display.question),
+            )
+        ),
         "",
         offered,
         *tables.format_in_line(list_offer_reasons(listed_offers)),
@@ -109,6 +120,33 @@ def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
         *_list_verdict_of_requested(trade_off, trade_off.requested),
         *_list_choice_if_td_is_free(trade_off, trade_off.requested),
     ]
+
+
+def list_next_step(
+    trade_off: TradeOff, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of the requested or chosen pair if it can be used, or to a better pair."""
+    offer = trade_off.requested or trade_off.recommended
+    decision = trade_off.decide_on(offer) if offer else None
+    situation = trade_off.situation
+    if offer is None or offer.tr is None or decision is None:
+        step = f"compare all flights with {write_command(question, 'plan')}"
+    elif decision.verdict == DO_NOT_USE:
+        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        step = name_step_after_refusal(
+            offer.answer.situation, decision.better, question, otherwise
+        )
+    else:
+        times = ("--td", f"{offer.td:.6g}")
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(offer.tr, offer.td)],
+            question._replace(times=times),
+            "suggest",
+            flying=situation.flight.by_parts,
+        )
+    return [("next", step)]
 
 
 def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
@@ -156,7 +194,7 @@ def _list_choice_if_td_is_free(
 
 
 def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what an offer with a smaller error costs, and what an offer with a longer rigid time costs, as text."""
+    """Describe the drawbacks of a pair with a smaller error and of a pair with a longer rigid time."""
     best = trade_off.recommended
     if best is None:
         return []
@@ -164,16 +202,27 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
     accurate = trade_off.more_accurate
     if accurate:
         cost_text = _describe_cost_change(best, accurate)
-        lines.append(("smaller error", f"{_describe_error_at(accurate)} {cost_text}"))
+        warned = _warn_about_refused(accurate)
+        lines.append(
+            ("smaller error", f"{_describe_error_at(accurate)}{warned} {cost_text}")
+        )
     longest = trade_off.start
     if longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0):
         cost_text = _describe_cost_change(best, longest)
-        lines.append(("longest", f"{_describe_error_at(longest)} {cost_text}"))
+        warned = _warn_about_refused(longest)
+        lines.append(("longest", f"{_describe_error_at(longest)}{warned} {cost_text}"))
     return lines
 
 
+def _warn_about_refused(offer: Offer) -> str:
+    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise an empty string."""
+    decision = offer.decision
+    refused = decision is not None and decision.verdict == DO_NOT_USE
+    return f" ({DO_NOT_USE})" if refused else ""
+
+
 def _describe_offer(offer: Offer) -> str:
-    """Describe an offer with a pair: its times, its error and its rigid time."""
+    """Describe a proposed pair by its times, its error and its rigid time."""
     times = f"tr = {offer.tr:.6g}, td = {offer.td:.6g}"
     return (
         f"{times}, {_format_offer_error(offer)}, rigid for {offer.rigid_time or 0:.6g}"
@@ -181,18 +230,23 @@ def _describe_offer(offer: Offer) -> str:
 
 
 def _describe_error_at(offer: Offer) -> str:
-    """Describe the error of an offer as the beginning of a sentence."""
+    """Return the start of a sentence that states the error of a proposed pair."""
     return f"td = {offer.td:.6g} with {_format_offer_error(offer)}"
 
 
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the lines and the offers of the text table as Markdown, with the reasons of the verdicts above them."""
+    """Return the lines and the pairs of the text table as Markdown, with the reasons for the verdicts above them."""
     listed_offers = select_offers(trade_off, display.limit)
     offer_table = tables.select_known_columns(*build_offer_table(listed_offers))
     reasons = tables.format_as_list(list_offer_reasons(listed_offers))
     return "\n\n".join(
         [
-            *tables.format_as_list(list_answer_lines(trade_off)),
+            *tables.format_as_list(
+                (
+                    *list_answer_lines(trade_off),
+                    *list_next_step(trade_off, display.question),
+                )
+            ),
             *reasons,
             tables.as_markdown(*offer_table),
         ]
@@ -200,7 +254,7 @@ def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
-    """Return CSV with a row for each offer and a column for each key of ``offers`` in JSON that has a single value."""
+    """Return CSV with a row for each td and a column for each key of ``offers`` in JSON that has a single value."""
     return write_csv(COLUMNS, map(OFFER.plain, trade_off.offers))
 
 
@@ -218,7 +272,7 @@ def give_answer(trade_off: TradeOff) -> str:
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
-    """Describe what the next better td changes, or say that no td is better."""
+    """Describe what the next better td changes, or state that no td is better."""
     step = trade_off.step
     if step is None:
         small = requested.error is not None and requested.error <= EQUALLY_GOOD
@@ -298,7 +352,7 @@ def _describe_cost_change(start: Offer, step: Offer) -> str:
 
 
 def _format_offer_error(offer: Offer) -> str:
-    """Return the error of an offer with its name."""
+    """Return the error of a proposed pair with its name."""
     if offer.error is None:
         return "an energy above twice its mean"
     if offer.basis == "energy":
@@ -309,7 +363,7 @@ def _format_offer_error(offer: Offer) -> str:
 
 
 def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
-    """Return up to ``limit`` offers: those that the answer names, and evenly spaced Pareto-optimal ones."""
+    """Return up to ``limit`` proposed pairs: those that the answer names, and evenly spaced Pareto-optimal ones."""
     named_td = {
         offer.td
         for offer in (
@@ -336,7 +390,7 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 def build_offer_table(
     offers: Sequence[Offer],
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of the offers; the recommended offer has a star.
+    """Return the column names and cells of the proposed pairs; the recommended pair has a star.
 
     `list_offer_reasons` explains the numbers beside the verdicts.
     """
@@ -346,23 +400,23 @@ def build_offer_table(
 
 
 def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
-    """Return the reasons of the verdicts on the offers, each with its number in the table."""
+    """Return the reasons for the verdicts on the proposed pairs, each with its number in the table."""
     return list_numbered_reasons(_number_offer_reasons(offers))
 
 
 def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
-    """Number the reasons why the verdicts on the offers are not better."""
+    """Number the footnotes that explain why the proposed pairs are not rated higher."""
     return number_reasons(offer.decision for offer in offers if offer.decision)
 
 
 def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
-    """Return the verdict on the pair of an offer with the number of its reason."""
+    """Return the verdict on a proposed pair, with the number of its reason."""
     decision = offer.decision
     return format_with_number(decision, numbers) if decision else "no admissible tr"
 
 
 def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
-    """Return a function that formats a measure of an offer's best pair."""
+    """Return a function that formats a measure of the best pair at a td."""
     return lambda offer: (
         tables.format_if_known(getattr(offer.best, key), form) if offer.best else None
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -15,12 +16,17 @@ from d2rpick.report.decision import (
     list_verdict_lines,
 )
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.switched.comparison import Comparison
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 # Fields of the judged pair, its measures and the verdict.
 MEASURES: Final = row(
@@ -73,7 +79,10 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
-    verdict_lines = list_pair_verdict(answer)
+    verdict_lines = [
+        *list_pair_verdict(answer),
+        *list_next_step(answer, display.question),
+    ]
     if answer.switched:
         verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
     lines = tables.format_in_line(verdict_lines)
@@ -97,8 +106,35 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
 
 
+def list_next_step(
+    answer: PairVerdict, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of a pair that can be used, a page on its switched run, or a better pair."""
+    decision = answer.decision
+    situation = answer.situation
+    if decision.verdict == DO_NOT_USE:
+        line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+        step = name_step_after_refusal(
+            situation, decision.better, question, f"compare other td with {line}"
+        )
+    elif answer.switched:
+        words = (*question.times, "--report", "verify.html")
+        line = write_command(question, "verify", *words)
+        step = f"use the results of the switched run; keep the comparison with {line}"
+    else:
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(answer.candidate.tr, answer.td)],
+            question,
+            "card",
+            flying=situation.flight.by_parts,
+        )
+    return [("next", step)]
+
+
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return whether the switched run agrees with the reference run, with the limits, after the name of the line."""
+    """Return the name of a line, and whether the switched run agrees with the reference run, with the limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
@@ -149,12 +185,17 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     return [row for row in rows if row[1] is not None]
 
 
-def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
+def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
     """Return the verdict, and the measures as a Markdown table of two columns."""
     switched = answer.switched
     comparison_lines = [list_comparison_verdict(switched)] if switched else []
     paragraphs = tables.format_as_list(
-        (*comparison_lines, *list_pair_verdict(answer), *list_pair_evidence(answer))
+        (
+            *comparison_lines,
+            *list_pair_verdict(answer),
+            *list_next_step(answer, display.question),
+            *list_pair_evidence(answer),
+        )
     )
     table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
     if switched:
@@ -169,7 +210,7 @@ def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return each measure by its key, with the prefix ``switched_`` for a switched run. Reasons are one text."""
+    """Return the measures, keyed by name, with the prefix ``switched_`` for a switched run. Reasons form one text."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -206,7 +247,7 @@ def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
 
 
 def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
-    """Return how far the switched run deviates from the reference after td, as (name, text) pairs."""
+    """Return how far the switched run deviates from the reference run after td, as (name, text) pairs."""
     error = switched.momentum_error
     displacement = switched.displacement
     if error is None:
@@ -221,7 +262,7 @@ def list_deviations(switched: Comparison) -> list[tuple[str, str]]:
 
 
 def _format_comparison(switched: Comparison) -> list[str]:
-    """Return the lines that compare the switched run with the reference."""
+    """Return the lines that compare the switched run with the reference run."""
     return [
         f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, compare_values(switched)),
@@ -231,7 +272,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures of the switched run by name; empty if there is no switched run."""
+    """Return the measures of the switched run, keyed by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

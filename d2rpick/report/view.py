@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown beyond each end of the flight, as a share of its length, so that load and landing are visible.
+# Time shown beyond each end of the flight, as a fraction of its length [-], so that load and landing are visible.
 _BEYOND = 0.06
-# LOGARITHMIC: the energy axis is logarithmic if the highest energy exceeds the target energy by more than this factor.
-# BELOW_LEVEL: a logarithmic energy axis begins at the target energy divided by this factor.
+# LOGARITHMIC: largest ratio of the highest energy to the target energy on a linear energy axis [-].
+# BELOW_LEVEL: ratio of the target energy to the lowest energy of a logarithmic energy axis [-].
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# Space above and below the curve, as a share of the curve's height.
+# Space above and below the curve, as a fraction of the height of the curve [-].
 _ROOM = 0.08
-# Share of a flight at each of its ends that is ignored, because the load or the landing may still act there.
+# Fraction of a flight that is ignored at each of its ends, because the load or the landing may still act there [-].
 _UNSURE = 0.01
-# Number of points of a curve, which gives a few dozen per oscillation cycle.
+# Number of points of a curve; it gives a few dozen points per oscillation cycle.
 _POINTS = 2000
 
 
@@ -46,7 +46,7 @@ class View(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Lowest and highest visible value of an axis, with a margin [energy]; ``logarithmic`` gives the axis's kind."""
+    """Lowest and highest visible value of an axis, with a margin [energy]; ``logarithmic`` gives the kind of axis."""
 
     low: float
     high: float
@@ -56,7 +56,7 @@ class Scale(NamedTuple):
 def merge_windows(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
-    """Merge windows, in ascending order, that are less than ``gap`` apart [time], since noise makes hundreds of them.
+    """Merge ascending windows that are less than ``gap`` apart [time], because noise produces hundreds of them.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def make_scale(low: float, high: float, level: float) -> Scale:
 def make_scale_of_flight(
     situation: Situation, view: View, levels: Sequence[float]
 ) -> Scale:
-    """Return the scale for a flight and its levels; if there is no vibration, for the energy of the whole run."""
+    """Return the scale for a flight and its levels or, if there is no vibration, for the energy of the whole run."""
     if situation.at_rest:
         return make_scale(
             0.0,
@@ -102,7 +102,7 @@ def make_scale_of_flight(
 
 
 def make_view_of_situation(situation: Situation, *times: float) -> View:
-    """Return the view of the flight of a situation, its td and other ``times`` [time]."""
+    """Return the view of the flight of a situation, including td and other ``times`` [time]."""
     span = situation.evidence.span
     last_known = max(span.end, situation.td) if span else None
     return make_view(
@@ -116,7 +116,7 @@ def make_view(
     times: list[float],
     last_known: float | None = None,
 ) -> View:
-    """Return the view of a flight and ``times`` [time]. A flight of unknown end lasts until ``known`` or the last time.
+    """Return the view of a flight and ``times`` [time]. A flight without known end lasts until ``last_known``.
 
     If no flight is known, the view is the whole record.
     """
@@ -157,7 +157,7 @@ def make_view(
 def _read_flight_energies(
     history: History, start: float, end: float, inner: tuple[float, float]
 ) -> Samples:
-    """Return the energies in the flight except near its ends, or those of adjacent states if the flight has none."""
+    """Return the energies in the flight except near its ends, or of adjacent states if the flight has none."""
     margin = _UNSURE * (end - start)
     flown = history.between(start + margin, end - margin)[1]
     return flown if flown.size else history.energies_at(np.array(inner))
@@ -211,7 +211,7 @@ def replay_motion(
 
 
 class Response(NamedTuple):
-    """Motion of the single oscillator that describes a record; it determines the motion for any switch times.
+    """Response of the single oscillator that describes a record; it determines the motion for any switch times.
 
     On an even grid of ``time`` (n,) [time], ``reference`` is the deformation without switching; ``release`` is the
     share of a released deformation that remains after the time since the first grid point.  Deformations vibrate about

@@ -55,7 +55,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
         ),
         "no-flight": Explanation(
             "Nothing in the record shows when the load ends, so d2rpick cannot recommend a tr.",
-            "Give the end of the load with --after, or write the part momenta in the next run.",
+            "If the parts never fly, do not switch them. If they fly, give the end of the load with --after, or write "
+            "the part momenta in the next run.",
         ),
         "no-free-flight": Explanation(
             "The parts do not fly at this td: a force, a support or a prescribed motion acts on them. The warning "
@@ -109,7 +110,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
         "out-of-place": Explanation(
             "A part that moves inside the body is frozen in the position that it has at tr. At td the body is "
             "displaced by the stated length, which is more than 1 % of its path. The next contact shifts.",
-            "Leave the moving part deformable, choose another tr, or accept the displacement.",
+            "Leave the moving part deformable, or choose another tr. You may accept the displacement if no result "
+            "depends on the exact time and place of the next contact.",
         ),
         "partly-rigid": Explanation(
             "In the stated interval, some of the chosen parts were rigid and others were deformable. d2rpick does not "
@@ -248,7 +250,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor. It uses the history instead.",
+            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor, and uses the history instead. Or "
+            "the deck already contains switching cards, which the answer does not consider.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(
@@ -408,6 +411,6 @@ EXPLANATIONS: Final = {
 
 
 def explain_warning(code: str) -> str:
-    """Return the explanation of a warning by its code, one of `EXPLANATIONS`."""
+    """Return the explanation of the warning with a code, which is one of `EXPLANATIONS`."""
     means, fix = EXPLANATIONS[code]
     return f"{code} (warning): {means}\n\nFix: {fix}"

@@ -44,15 +44,15 @@ _ALL = (
 )
 # Beginning of the ids of the rules that need an energy history.
 _BY_HISTORY: Final = "D2R2"
-# Smallest similarity (0 to 1) of a suggested rule id to the wrong id; it permits one additional character.
+# Smallest similarity (0 to 1) of a suggested rule id to the wrong id; this value permits one additional character.
 _ALIKE: Final = 0.9
-# For each rule that reports a wrong unit: the rules that report only consequences of the same mistake.
+# Rules that report only consequences of a wrong unit, keyed by the rule that reports the wrong unit.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# For each rule: other rules that already report the same field, such as a time after the end of the run.
+# Other rules that already report the same field, such as a time after the end of the run, keyed by rule.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
@@ -119,7 +119,7 @@ class Configuration(NamedTuple):
 
 
 def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
-    """Return the part of an error message that names the existing rule ids, and a similar rule id if there is any."""
+    """Return the part of an error message that names the existing rule ids, and a similar rule id if there is one."""
     import difflib
 
     wanted = name.upper()
@@ -132,7 +132,7 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
 
 
 def _count_differences(first: str, second: str) -> int:
-    """Return the number of different characters in two strings of equal length, else the longer length."""
+    """Return the number of different characters in two strings of equal length, or the longer of unequal lengths."""
     if len(first) != len(second):
         return max(len(first), len(second))
     return sum(a != b for a, b in zip(first, second, strict=True))
@@ -189,7 +189,7 @@ def _read_rule_names(
 
 
 class CheckedWindow(NamedTuple):
-    """A rigid window; ``place`` is the card that opens it. The deck is not kept in memory.
+    """A rigid window; ``place`` is the card that opens the window. The deck is not kept in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     ``decision`` is the verdict on its pair of times; None if no history judges the pair.
@@ -204,7 +204,7 @@ class CheckedWindow(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """Return the part id, or None if the unit is a part set or rigid body whose parts are unknown."""
+        """Return the part id; None for a part set or rigid body whose parts are unknown."""
         return self.unit.part
 
 
@@ -311,7 +311,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Leave out findings that only follow from a wrong unit or time which another rule reports."""
+    """Remove findings that only follow from a wrong unit or time which another rule reports."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {
@@ -352,7 +352,7 @@ def _strip_windows(case: Case) -> Iterator[CheckedWindow]:
 def _select_rules(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
-    """Return the selected rules for a solver. The result is cached because there may be thousands of decks."""
+    """Return the selected rules for a solver. The result is cached, because there may be thousands of decks."""
     configuration = Configuration(select, ignore)
     wanted = (
         rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-# Values of CODE with which a switch set waits for a contact or wall force.
+# Values of CODE for which a switch set waits for a contact or wall force.
 _BY_FORCE = {1, 2, 3, 4}
 
 K = TypeVar("K")
@@ -289,12 +289,12 @@ class Case:
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the cards that do not switch by time, each with the event that triggers it."""
+        """Return the cards that do not switch by time, each with the event that triggers the switch."""
         return ()
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return, by part id, the formulation of each solid part whose stresses do not rotate with a rigid body."""
+        """Return the formulation of each solid part whose stresses do not rotate with a rigid body, by part id."""
         sections = read_sections(self.deck)
         part_sections = (
             (part, sections.get(number)) for part, number in self.parts.sections.items()
@@ -307,7 +307,7 @@ class Case:
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Return the parts that must not be switched, with the reason, by part id."""
+        """Return the parts that must not be switched, with the reason, keyed by part id."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
@@ -326,7 +326,7 @@ class Case:
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class RunCase(Case):
-    """A Radioss run as input of the rules: starter deck, engine files (``legs``), and the windows that they make."""
+    """A Radioss run as input of the rules: starter deck, engine files (``legs``), and the resulting windows."""
 
     run: RadiossRun
 
@@ -374,7 +374,7 @@ class RunCase(Case):
 
     @cached_property
     def windows(self) -> Windows:
-        """Return the rigid windows of all parts, or of the body if its parts are unknown."""
+        """Return the rigid windows of all parts, or of bodies whose parts are unknown."""
         return self.found.windows
 
     @cached_property
@@ -405,7 +405,7 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end time of the last engine run as written."""
+        """Return the end time of the last engine run as written in its file."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
@@ -443,12 +443,12 @@ class RunCase(Case):
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return the parts whose elements have no co-rotational frame, with the formulation."""
+        """Return the formulation of each part whose elements have no co-rotational frame, keyed by part id."""
         return self.run.starter.unturned if self.run.starter else {}
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Return the parts that must not be switched, with the reason, by part id."""
+        """Return the parts that must not be switched, with the reason, keyed by part id."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.unswitchable import find_unswitchable_in_radioss
 
@@ -468,7 +468,7 @@ class RunCase(Case):
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
-        """Return the indices of the engine runs in which a part or body is rigid, each with its windows."""
+        """Return the indices of the engine runs in which a part or body is rigid, each with the rigid windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
-# For each CODE: what exerts the force, and True if the set waits for the force, False if for its end.
+# For each CODE: what exerts the force, and True if the set waits for the force, False if it waits for its end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,9 +34,9 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-# Smallest TIME2 that means that a set has no latest switching time.
+# Smallest TIME2 that stands for the absence of a latest switching time.
 _NEVER: Final = 1e20
-# A window up to this share of the longest window is chatter and not a flight [-].
+# Largest length of a window that is chatter and not a flight, as a fraction of the longest window [-].
 _SHORT: Final = 0.1
 
 
@@ -56,7 +56,7 @@ class Forced(NamedTuple):
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Return the windows of the switched parts in ascending order; each window occurs once."""
+        """Return the windows of the switched parts in ascending order, without duplicates."""
         return sorted(
             {(window.tr, window.td) for window in self.windows},
             key=lambda pair: pair[0],
@@ -69,7 +69,7 @@ class Forced(NamedTuple):
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Return the windows that are not chatter; if a window has no end, its end is infinity."""
+        """Return the windows that are not chatter; the end of a window that has none is infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
@@ -167,7 +167,7 @@ def _see_contacts(
 
 
 def _can_trigger(deck: Deck, header: SwitchHeader) -> bool:
-    """Return True if the force of contact or rigid wall ENTNO may switch parts, or the deck does not define it."""
+    """Return True if the force of the contact or rigid wall ENTNO may switch parts, or if the deck lacks it."""
     kind, _ = _CODES[header.code.value]
     entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
     return entity is None or kind != "contact" or entity.triggers
@@ -240,7 +240,7 @@ def _find_pair(
     by_card: dict[SwitchSet, list[SwitchEvent]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Return the set that makes the same parts deformable as ``rigid_card`` makes rigid, or None."""
+    """Return the set that makes the parts of ``rigid_card`` deformable again; None if there is none."""
     units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:
@@ -249,5 +249,5 @@ def _find_pair(
 
 
 def _find_event(unit: Unit, events: Sequence[SwitchEvent]) -> SwitchEvent | None:
-    """Return the event that switches a unit; None if there is no such event."""
+    """Return the event that switches a part or other unit; None if there is no such event."""
     return next((event for event in events if event.unit == unit), None)

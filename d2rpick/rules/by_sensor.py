@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Sensed(NamedTuple):
-    """A switch set with CODE 5, and the ``changes`` of its sensor control; ``unknown`` says why they are unknown."""
+    """A switch set with CODE 5, and the ``changes`` of its sensor control, or the reason why they are ``unknown``."""
 
     by: SwitchSet
     changes: tuple[Change, ...] = ()
@@ -30,7 +30,7 @@ class Sensed(NamedTuple):
     ) -> Iterator[tuple[float, SwitchEvent]]:
         """Yield the time and event of each switch; the parts are rigid while the control is on."""
         set_events = [event for event in events if event.by is self.by]
-        # A control that begins OFF finds the parts deformable, so its first OFF switches nothing.
+        # If a control begins as OFF, the parts are already deformable, so its first OFF switches nothing.
         begins_off = self.changes[:1] == (Change(0.0, on=False),)
         for change in self.changes[begins_off:]:
             for event in set_events:
@@ -45,7 +45,7 @@ def follow_sensed_switches(
     judge: HistoryJudge | None,
     end: float,
 ) -> Iterator[Sensed]:
-    """Yield the CODE 5 sets of an LS-DYNA deck with their controls; if there is no history, only time is evaluated."""
+    """Yield the CODE 5 sets of an LS-DYNA deck with their controls; without a history, only times are evaluated."""
     controls = {control.switch_set: control for control in read_controls(deck)}
 
     def find_spans(kind: str, number: int, least: float) -> Spans | None:

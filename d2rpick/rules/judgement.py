@@ -68,7 +68,7 @@ class Fault(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """The objections to a window, and the verdict on its pair; None if the history cannot judge the pair."""
+    """The objections to a window, and the verdict on its pair; None if the history is insufficient for a verdict."""
 
     faults: tuple[Fault, ...] = ()
     decision: Decision | None = None
@@ -113,7 +113,7 @@ class HistoryJudge:
 
     @property
     def cautions(self) -> list[Caution]:
-        """Return the warnings of all judgements that were made so far."""
+        """Return the warnings of all judgements made so far."""
         return [
             caution._replace(message=f"{name_units(parts)}: {caution.message}")
             if parts
@@ -123,7 +123,7 @@ class HistoryJudge:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return what readers omitted or assumed in all judgements that were made so far."""
+        """Return what readers omitted or assumed in all judgements made so far."""
         return tuple(
             dict.fromkeys(
                 note
@@ -176,7 +176,7 @@ class HistoryJudge:
         return self._judgements[key]
 
     def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
-        """Return the parts that have internal energy at any time; None if the history lacks one of them."""
+        """Return those parts that have internal energy at any time; None if the history lacks one of the parts."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if len(chosen) < len(parts):
             return None
@@ -197,7 +197,7 @@ class HistoryJudge:
         return contact_times and contact_times.spans
 
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
-        """Return the time spans that `contacts` returns, and their uncertainty [time]."""
+        """Return the time spans returned by `contacts`, and their uncertainty [time]."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if chosen:
             momenta = next(
@@ -244,7 +244,7 @@ class HistoryJudge:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts that have no energy lock in no energy, which a note reports; only the flight limits their times.
+            # Parts without energy lock in no energy, which a note reports; only the flight limits their times.
             is_flight_known = verdict.situation.flight.start is not None
             return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
         for caution in verdict.cautions:
@@ -256,7 +256,7 @@ class HistoryJudge:
 def _find_times_outside(
     history: History, tr: float, td: float | None
 ) -> Iterator[Fault]:
-    """Yield objections to times outside the history, and to a td that seems to have another unit."""
+    """Yield objections to times outside the history, and to a td that seems to be in another unit."""
     first = history.start
     last = history.end
     named_times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
@@ -295,7 +295,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         yield Fault("D2R209", False, what)
     elif (
         _loses_most(situation)
-        # One mistake yields only one finding.
+        # A single mistake should cause only one finding.
         and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
@@ -307,7 +307,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
 def _judge_open_window(
     history: History, tr: float, settings: Settings
 ) -> Iterator[Fault]:
-    """Object to a tr that has no td, unless it lies in the last flight of the history or in a flight around tr."""
+    """Object to a tr without td, unless it lies in the last flight of the history or in a flight around tr."""
     last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
@@ -386,7 +386,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Suggest a tr that suits this td, or a better pair, or say where to look for a pair.
+    """Suggest a tr that suits this td, or a better pair, or where to look for a pair.
 
     A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
     """

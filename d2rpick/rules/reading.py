@@ -441,7 +441,7 @@ def _report_missing_parts(case: Case) -> Iterator[Objection]:
 
 
 def _describe_course(sensed: Sensed) -> str:
-    """Return a string that says when a sensor control is on, or why that is unknown."""
+    """Describe when a sensor control is on, or why that is unknown."""
     if sensed.unknown:
         return f", by {sensed.unknown}; not judged by time"
     changes = sensed.changes
@@ -453,7 +453,7 @@ def _describe_course(sensed: Sensed) -> str:
 
 
 def _describe_trigger(card: SwitchSet) -> str:
-    """Return the trigger of a switching card that has no time; empty for other cards and ineffective triggers."""
+    """Return the trigger of a switching card without a time; empty for other cards and ineffective triggers."""
     if card.restart:
         return ""
     if card.kind == "restart":

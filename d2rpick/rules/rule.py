@@ -1,4 +1,4 @@
-"""Build the rules of ``check``: the `Rule` type, its decorators, and the pieces of decks that the examples use."""
+"""Build the rules of ``check``: the `Rule` type, its decorators, and the parts of decks that the examples use."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # File name of an example deck that is given no other name.
+MAIN_DECK: Final = "main.k"  # File name of an example deck without another name.
 
 HEAD = """\
 *KEYWORD
@@ -81,7 +81,7 @@ class Rule(NamedTuple):
     solvers: tuple[str, ...] = (LS_DYNA,)
 
 
-# The code below makes pieces of LS-DYNA decks and Radioss runs for the examples.
+# The code below makes parts of LS-DYNA decks and Radioss runs for the examples.
 
 
 def write_automatic_card(
@@ -123,12 +123,12 @@ GOOD = HEAD + PARTS + THERE + BACK + END
 
 
 def make_deck(*cards: str) -> Example:
-    """Return an example deck that has two parts and these cards."""
+    """Return an example deck with two parts and the given cards."""
     return Example(HEAD + PARTS + "".join(cards) + END)
 
 
 def make_window(tr: str, td: str, more: str = "") -> Example:
-    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``; the cards in ``more`` follow."""
+    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``, followed by the cards ``more``."""
     return make_deck(
         write_automatic_card(1, tr, rigid=["1"]),
         write_automatic_card(2, td, deformable=["1"]),
@@ -140,7 +140,7 @@ PASS = Example(GOOD)
 
 
 def write_starter_deck(group: str = GROUP, more: str = "") -> str:
-    """Return a starter deck with one part, which is a rigid body on a node group; the text ``more`` follows."""
+    """Return a starter deck with one part, which is a rigid body on a node group, followed by the text ``more``."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY}{group}{more}/END\n"
 
@@ -148,7 +148,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return engine files by file name; an engine run is given by its end time and ON, OFF or nothing for /RBODY."""
+    """Return engine files, keyed by file name, for given end times and /RBODY cards (ON, OFF or none)."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import RadiossLeg
     from d2rpick.deck.radioss_run import LeftRigid
 
-# Largest time step as a fraction of the rigid window, because parts are released up to one time step late.
+# Largest time step, as a fraction of the rigid window [-], because parts are released up to one time step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # A message lists at most this number of main nodes.
+_MOST_LISTED = 8  # Largest number of main nodes that a message lists.
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
@@ -80,7 +80,7 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
 
 
 def _make_run_with(*more: str) -> Example:
-    """Return an example run that satisfies all rules, with these additional cards in the starter deck."""
+    """Return an example run that satisfies all rules, with the given additional cards in the starter deck."""
     return make_run(_LEGS, write_starter_deck(more="".join(more)))
 
 
@@ -108,7 +108,7 @@ def _make_wheel_run(
 
 
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
-    """Return the engine runs (legs) if any of them switches a body; otherwise return no legs."""
+    """Return the engine runs if any of them switches a body; otherwise empty."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -378,7 +378,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield the flaws of the run that have this code."""
+    """Yield the flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
@@ -532,7 +532,7 @@ def _check_velocities(case: RunCase) -> Iterator[Objection]:
 
 
 def _make_sensed_run(*lines: str) -> Example:
-    """Return a run in which a /SENSOR/TIME with these lines switches the body."""
+    """Return a run in which a /SENSOR/TIME with the given lines switches the body."""
     deck = write_starter_deck().replace(
         _write_row(1808, 0)[:-1], _write_row(1808, 5)[:-1]
     )

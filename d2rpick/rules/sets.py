@@ -131,7 +131,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
         ):
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
-            # A problem that concerns both sets is reported once, at one of them.
+            # A problem that concerns both sets is reported only once, at one of them.
             first = header.swset.value < partner.swset.value
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
@@ -172,7 +172,7 @@ def _find_swapped(case: Case) -> Iterator[tuple[SwitchHeader, str]]:
 
 
 def _find_units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
-    """Return the units that a card makes rigid, or deformable."""
+    """Return the parts, or sets of unknown parts, that a card makes rigid (``to_rigid``) or deformable."""
     return {
         event.unit
         for event in case.windows.events
@@ -228,7 +228,7 @@ def _check_timed_pairs(case: Case) -> Iterator[Objection]:
 
 
 def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
-    """Yield the readable headers with one of these CODEs."""
+    """Yield the readable headers with one of the given CODEs."""
     for _, header in case.headers:
         if (
             not header.code.problem
@@ -328,7 +328,7 @@ def _check_entity_triggers(case: Case) -> Iterator[Objection]:
 
 
 def _list_entities(entities: Entities) -> str:
-    """List the contacts or walls as text, each with its id, keyword and title."""
+    """Return the contacts or walls as text, each with its id, keyword and title."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found
@@ -337,7 +337,7 @@ def _list_entities(entities: Entities) -> str:
 
 
 def _make_sensor_deck(control: str) -> Example:
-    """Return a deck whose switch set has CODE 5, with this *SENSOR_CONTROL."""
+    """Return a deck whose switch set has CODE 5, with the given *SENSOR_CONTROL."""
     return make_deck(
         control + write_automatic_card(20, "0.0", rigid=["1"], code=BY_SENSOR)
     )
@@ -384,7 +384,7 @@ def _check_sensor_control(case: Case) -> Iterator[Objection]:
 
 
 def _find_controlled(card: Card) -> Iterator[int]:
-    """Yield the id of the switch set that a *SENSOR_CONTROL switches, if it switches one."""
+    """Yield the id of the switch set that a *SENSOR_CONTROL switches, if there is one."""
     for row in card.data[:1]:
         if card.word(row, SENSOR_CONTROL["TYPE"]).value == "DEF2RIG":
             yield (

@@ -21,12 +21,13 @@ from d2rpick.rules.rule import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import CardField
+    from d2rpick.deck.ls_dyna_parts import Constraint
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # A message suggests at most this number of part ids for an unknown id.
+_NEAREST = 3  # Largest number of part ids that a message suggests for an unknown id.
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -36,7 +37,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-_DELETED = 1  # Value of NRBF and NCSF with which a card deletes constraints.
+_DELETED = 1  # Value of NRBF and NCSF for which a card deletes constraints.
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
@@ -106,7 +107,7 @@ def _group_by_card(
 
 
 def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
-    """Return True if the deck switches a part set whose parts are unknown, because it may contain any part."""
+    """Return True if the deck switches a part set of unknown parts, which may contain any part."""
     return any(
         event.unit.is_set and event.line.to_rigid == to_rigid
         for event in case.windows.events
@@ -241,7 +242,7 @@ def _check_ids_exist(case: Case) -> Iterator[Objection]:
 
 
 def _list_nearest(number: int, parts: DeckParts) -> str:
-    """Name the nearest part ids of the deck with their titles, as text in brackets."""
+    """Return the nearest part ids of the deck with their titles, as text in brackets."""
     from heapq import nsmallest  # Imported here to keep start-up fast.
 
     near = sorted(
@@ -328,7 +329,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part in ``first``.
+    """Return the lead part of the rigid body of each part in ``first``, keyed by part id.
 
     The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """
@@ -344,7 +345,7 @@ def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
 
 
 def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
-    """Return True if two parts or sets may be rigid at the same time. If a force switches them, this is assumed."""
+    """Return True if two parts or sets may be rigid at the same time, which is assumed if a force switches them."""
     if {first, second} & case.windows.other_rigid:
         return True
     far = float("inf")
@@ -360,7 +361,7 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
 
 
 def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
-    """Yield constraints on parts if a card makes the parts rigid and does not delete the constraints."""
+    """Yield constraints on parts that a card makes rigid without deleting the constraints."""
     switched = _find_left_active(case, nodal=nodal)
     constraints = [
         constraint
@@ -368,6 +369,8 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
         if (constraint.kind == "nodal rigid body") == nodal
     ]
     owner = _find_owners(case, switched) if constraints else {}
+    parts_of_nodes = _find_parts_of_nodes(case, constraints) if nodal else {}
+    parts_made_rigid = {event.unit.id for event in case.made_rigid}
     for constraint in constraints:
         part_of_nodes = (
             owner[node] for node in sorted(constraint.nodes) if node in owner
@@ -383,12 +386,40 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
             name = constraint.kind
         flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
         problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
-        cure = "set the flag to 1 there and to 2 on the card that switches back"
+        held_parts = _find_held_parts(constraint, parts_of_nodes)
+        if unswitched_parts := held_parts - parts_made_rigid:
+            held = f"it also holds {name_units(unswitched_parts)}, so do not delete it"
+            cure = f"{held} (D2R120): make all its parts rigid, or none of them"
+        else:
+            cure = "set the flag to 1 there and to 2 on the card that switches back"
         yield constraint.place, f"{problem}, so it stays active; {cure}"
 
 
+def _find_parts_of_nodes(
+    case: Case, constraints: Sequence[Constraint]
+) -> dict[int, set[int]]:
+    """Return, by node id, all parts whose elements contain a node of the constraints."""
+    cards = find_element_cards(case.deck, searched=True) if constraints else ()
+    if not cards:
+        return {}
+    # Imported here to keep start-up fast.
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+
+    nodes = frozenset[int]().union(*(constraint.nodes for constraint in constraints))
+    return find_parts_of_nodes(cards, nodes)
+
+
+def _find_held_parts(
+    constraint: Constraint, parts_of_nodes: Mapping[int, Collection[int]]
+) -> set[int]:
+    """Return the parts that contain a node of a constraint."""
+    return set[int]().union(
+        *(parts_of_nodes.get(node, ()) for node in constraint.nodes)
+    )
+
+
 def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Return, by node id, the first of ``parts`` that contains the node."""
+    """Return the first of ``parts`` that contains each node, keyed by node id."""
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
@@ -407,7 +438,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; in a restart they are on *RIGID_DEFORMABLE_CONTROL.  A plain card has no flags."""
+    """Return the flags of a card; in a restart, they are on *RIGID_DEFORMABLE_CONTROL. A plain card has no flags."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -429,7 +460,7 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 
 
 def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Return, by part id, the flags of the first card that makes the part rigid and keeps its constraints."""
+    """Return the flags of the first card that makes a part rigid and keeps its constraints, keyed by part id."""
     first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
         flags = _find_flags(case, event.by)
@@ -501,7 +532,7 @@ def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
 
 
 def _make_law_deck(law: str) -> Example:
-    """Return a deck whose part 1 has the material law of this keyword."""
+    """Return a deck in which part 1 has the material law of the given keyword."""
     return make_deck(
         f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK
     )
@@ -558,7 +589,8 @@ def _check_nodal_bodies(case: Case) -> Iterator[Objection]:
     it, and the card that switches back must activate them again. Otherwise the run stops (Error 30164, as a public drop
     tool reports). Source: vendor keyword data for NRBF, according to which such bodies cause instabilities.
 
-    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
+    Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back. If the body
+    also holds a part that stays deformable, do not delete it (D2R120): switch both parts, or neither.
     """
     return _find_active_constraints(case, nodal=True)
 
@@ -582,7 +614,7 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
     NRBF and LRB.
 
-    Fix: Merge the parts by LRB, and switch all of them.
+    Fix: Switch all parts of the body and merge them by LRB, or switch none of them.
     """
     deleting = [
         event
@@ -594,17 +626,10 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
         for constraint in (case.constraints if deleting else ())
         if constraint.kind == "nodal rigid body"
     ]
-    cards = find_element_cards(case.deck, searched=True) if joining else ()
-    if not cards:
-        return
-    # Imported here to keep start-up fast.
-    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
-
     bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
-    joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))
-    owners = find_parts_of_nodes(cards, joined_nodes)
+    parts_of_nodes = _find_parts_of_nodes(case, joining)
     for constraint in joining:
-        parts = set[int]().union(*(owners.get(node, ()) for node in constraint.nodes))
+        parts = _find_held_parts(constraint, parts_of_nodes)
         switched = parts & bodies.keys()
         if not switched or len({bodies.get(part) for part in parts}) == 1:
             continue

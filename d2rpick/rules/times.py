@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-# Smallest number of output intervals in a rigid window for which crossings are found within 0.5 % of it.
+# Smallest number of output intervals in a rigid window for which crossings are found to within 0.5 % of the window.
 _INTERVALS = 200
-# Relative amount by which an output interval may exceed its limit, because of rounding.
+# Largest relative excess of an output interval over its limit that is treated as rounding [-].
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-# D2R102 and D2R105 would report one mistake twice if a deck has at most this number of cards.
+# Largest number of cards in a deck for which D2R102 and D2R105 would report the same mistake twice.
 _FEW = 2
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
 _DECADES = 3.0  # Number of powers of ten between two adjacent units of time.
-# Tolerance for the ratio of end times, as a power of ten; a reference run may end at half of the time.
+# Tolerance for the ratio of end times, as a power of ten [-]; a reference run may end at half of the time.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
     "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -110,7 +110,7 @@ def _check_times_in_run(case: Case) -> Iterator[Objection]:
 def _group_closed_windows(
     case: Case,
 ) -> dict[tuple[SwitchSet, SwitchSet], list[SwitchWindow]]:
-    """Return the windows that have both ends, grouped by the cards that open and close them."""
+    """Return the windows with both ends, keyed by the cards that open and close them."""
     return group_values(
         ((window.opened.by, window.closed.by), window)
         for window in case.windows.windows
@@ -119,7 +119,7 @@ def _group_closed_windows(
 
 
 def _name_parts(windows: Sequence[SwitchWindow]) -> str:
-    """List the ids of the parts in some windows as text."""
+    """Return the ids of the parts in some windows as text."""
     return name_units(window.unit.id for window in windows)
 
 
@@ -275,7 +275,7 @@ def _check_equal_times(case: Case) -> Iterator[Objection]:
 
 
 def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | None:
-    """Return a message if the times fit a run up to ``end`` only if multiplied by 1000 or 1/1000, else None.
+    """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000; else None.
 
     ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
@@ -338,7 +338,7 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Yield the problems of one rule that the energy history shows; parts of one card share a problem."""
+    """Yield the problems of one rule that the energy history shows; parts on one card share a problem."""
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window, judgement in case.judgements:
         for fault in judgement.faults:

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after the other."""
+"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after another."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest time step of a rigid leg, relative to the mean time step of the deformable legs.
-# With 5 times the time step, a rigid leg costs a few percent of a deformable leg, and its contacts stay visible.
+# Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
+# With 5 times the time step, a rigid engine run costs a few percent of a deformable one and resolves its contacts.
 _STEP_RATIO: Final = 5.0
-# A flight that is too short to be switched is reported if it lasts for at least this share of the required time [-].
+# Smallest duration of a reported flight that is too short to be switched, as a fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without output after which the silence of the solver is reported [s].
@@ -66,7 +66,7 @@ class Driven:
     why : str
         Why the wait has this length.
     saved : (float or None, float or None)
-        Saved share of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
+        Saved fraction of the cost of a deformable run, by the cost model and by CPU time; None if unknown.
     """
 
     run: OpenedRun
@@ -121,14 +121,14 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the leg that is being computed, or how many ``seconds`` the starter has run before the first leg."""
+        """Describe the engine run being computed, or how many ``seconds`` the starter has taken before the first."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
         return f"engine run {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
-        """Compute leg after leg up to the end of the run.
+        """Compute one engine run after another, up to the end of the run.
 
         Raises
         ------
@@ -141,7 +141,7 @@ class Driver:
             )
         while order := self._choose_next():
             self.at = order
-            # An earlier driver may have begun the leg, and the solver has finished it since.
+            # An earlier driver may have begun the engine run, and the solver may have finished it since.
             begun = self.journal.records[-1].get("order") == [*order]
             if not begun or self._find_problem(order):
                 self._start(order)
@@ -153,7 +153,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next leg. If its restart file is damaged, go back leg by leg to a complete restart file."""
+        """Choose the next engine run. If its restart file is damaged, go back to a complete restart file."""
         while True:
             legs = self.journal.legs
             order = choose_next_leg(legs, self.limits)
@@ -166,7 +166,7 @@ class Driver:
             )
 
     def _start(self, order: Order) -> None:
-        """Write the engine file of a leg and start the engine."""
+        """Write the engine file of an engine run, and start the engine."""
         number = order.number
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
@@ -184,7 +184,7 @@ class Driver:
         )
 
     def _start_solver(self, program: str, number: int) -> None:
-        """Start the solver on the deck of a leg: the starter if its ``number`` is 0, else the engine."""
+        """Start the solver for an engine run: the starter if its ``number`` is 0, otherwise the engine."""
         deck = self.solver.file(number, ".rad").name
         self.solver.start(self.commands.words(program, deck), number)
 
@@ -206,7 +206,7 @@ class Driver:
             raise
 
     def _find_problem(self, order: Order) -> str:
-        """Return why a leg has failed; "" if it ended normally, with complete restart files and a complete history."""
+        """Return why an engine run has failed; empty if it ended normally, with complete restart files and history."""
         number = order.number
         if not self.solver.ended_well(number):
             return f"the solver failed: {self.solver.last_words(number)}; continue with --resume"
@@ -218,7 +218,7 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Write to the journal that a leg has failed, so that the leg is computed again.
+        """Record in the journal that an engine run has failed, so that it is computed again.
 
         If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
         back by the leg that wrote it.
@@ -246,7 +246,7 @@ class Driver:
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
 
     def _end(self, order: Order) -> None:
-        """Write the findings of a leg to the journal."""
+        """Record the findings of an engine run in the journal."""
         number, legs = order.number, self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
@@ -267,7 +267,7 @@ class Driver:
 
 
 def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
-    """Return the largest time step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+    """Return the largest time step of a rigid engine run, from the smallest mean step of the deformable ones [time]."""
     steps = [
         leg.length / leg.cycles for leg in legs if not leg.order.rigid and leg.cycles
     ]
@@ -276,7 +276,7 @@ def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
-    """Return the longest waiting time of the legs that ended before a given time and in which parts vibrated [time]."""
+    """Return the longest waiting time of the earlier engine runs in which parts vibrated [time]."""
     waits = [
         leg.findings.wait or 0.0
         for leg in legs
@@ -286,7 +286,7 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
 
 
 class Observer:
-    """Reads the histories of legs for some ``parts`` of a deck.
+    """Reads the histories of engine runs for some ``parts`` of a deck.
 
     ``wait`` is the wait that the user gave, ``of_deck`` the wait that follows from the deck.
     """
@@ -309,7 +309,7 @@ class Observer:
     def look(
         self, order: Order, histories: Sequence[Path], wait_before: float
     ) -> LegFindings:
-        """Return the findings from the joined histories of several legs at the end of the last leg.
+        """Return the findings from the joined histories of several engine runs, at the end of the last of them.
 
         ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
         the record shows a longer one, which ``why`` then says.
@@ -326,7 +326,7 @@ class Observer:
         return self._find_flight(order, history)
 
     def _find_flight(self, order: Order, history: History) -> LegFindings:
-        """Return the findings of a deformable leg."""
+        """Return the findings of a deformable engine run."""
         now = float(history.time[-1])
         flights = self._evidence.flights()
         free = self._evidence.free_since(now)
@@ -357,7 +357,7 @@ class Observer:
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
-    """Choose as tr the start of a leg if it is in flight and has more internal energy than the end; else the end."""
+    """Choose tr: the start of an engine run in flight if it has more internal energy than the end, else the end."""
     start = max(order.start, float(history.time[0]))
     falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
     starts_in_flight = order.start >= max(free, order.switch_after)
@@ -380,7 +380,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed legs, except the legs that were undone by a restart from an earlier time."""
+        """Computed engine runs, except those that were undone by a restart from an earlier time."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":
@@ -391,7 +391,7 @@ class Journal:
 
     @property
     def has_failed(self) -> bool:
-        """True if the next leg has failed before."""
+        """True if the next engine run has failed before."""
         outcomes = ("prepared", "ended", "back", "failed")
         events = [record["event"] for record in self.records]
         return [event for event in events if event in outcomes][-1:] == ["failed"]
@@ -415,6 +415,6 @@ class Journal:
 
 
 def _read_leg(record: dict[str, Any]) -> Leg:
-    """Make a leg from a record of the journal."""
+    """Make the result of an engine run from a record of the journal."""
     order, findings = Order(*record["order"]), LegFindings(*record["seen"])
     return Leg(order, findings, record["cycles"], record["cpu"])

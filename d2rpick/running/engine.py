@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Paths of the programs in an installation, and their arguments.
+# Paths of the programs in an installation, and their arguments, keyed by program.
 _PROGRAMS: Final = {
     "starter": (
         ("bin/starter_gf", "exec/starter_linux64_gf"),
@@ -45,12 +45,12 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# _LISTING_SIZE: number of bytes read from the end of a starter's listing, where much output follows the errors.
-# _ERROR: characters with which an error in a listing begins.
+# _LISTING_SIZE: number of bytes read from the end of a starter listing, in which much output follows the errors.
+# _ERROR: characters at the beginning of an error in a listing.
 # _ERROR_LINES: number of lines of an error in a listing.
 _LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
 _MOST_LINES: Final = 8
-# A restart file is complete if it has at least this share of the size of the starter's restart file.
+# Smallest size of a complete restart file, as a fraction of the size of the starter's restart file [-].
 _WHOLE: Final = 0.98
 # _TIME_TO_STOP: time that a solver is given to stop by itself [s].
 # _PAUSE: time between two checks whether the solver has stopped [s].
@@ -65,7 +65,7 @@ class Commands(NamedTuple):
     threads: int = 1
 
     def words(self, program: str, deck: str) -> list[str]:
-        """Split the command that starts a program on a deck as a shell would.
+        """Split the command that starts a program on a deck, as a shell would.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Commands(NamedTuple):
                 f"--{program} {template!r}: cannot be split into words ({error})"
             ) from None
         if "/" in executable:
-            # The path is made absolute because the program is started in another folder.
+            # The path is made absolute, because the program is started in another folder.
             executable = str(Path(executable).absolute())
         threads = str(self.threads)
         return [
@@ -98,7 +98,7 @@ class Commands(NamedTuple):
         ]
 
     def missing(self) -> str:
-        """Return the first program that cannot be started, or "" if all can be started."""
+        """Return the first program that cannot be started; empty if all can be started."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -120,7 +120,7 @@ def _find_installed(program: str) -> str:
 
 
 def _make_environment(threads: int) -> dict[str, str]:
-    """Return the environment of the programs: the current one with the variables of an installation."""
+    """Return the environment of the programs: the current one, with the variables of an installation."""
     environment = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
     libraries = os.environ.get("LD_LIBRARY_PATH", "")
     if home := os.environ.get(_HOME):
@@ -145,7 +145,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int | None:
-    """Lock a file and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
+    """Lock a file, and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -170,21 +170,21 @@ class Solver:
         self._signal = 0  # Number of the signal that ended the last process, or 0.
 
     def file(self, number: int, suffix: str) -> Path:
-        """Return the path of a file of a leg; leg 0 is the starter."""
+        """Return the path of a file of an engine run; number 0 is the starter."""
         return self.folder / f"{self.name}_{number:04d}{suffix}"
 
     def history(self, number: int) -> Path:
-        """Return the path of the time history of a leg."""
+        """Return the path of the time history of an engine run."""
         return self.folder / f"{self.name}T{number:02d}"
 
     def clear(self, number: int) -> None:
-        """Remove the files of an earlier leg with this number."""
+        """Remove the files of an earlier engine run with the given number."""
         for path in self.folder.glob(f"{self.name}_{number:04d}[._]*"):
             path.unlink()
         self.history(number).unlink(missing_ok=True)
 
     def start(self, command: Sequence[str], number: int) -> None:
-        """Start the solver on a leg.
+        """Start the solver for an engine run.
 
         Raises
         ------
@@ -241,23 +241,23 @@ class Solver:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:
-        """Return the time since the solver last wrote anything [s]."""
+        """Return the time since the solver last wrote output [s]."""
         now = time.time()
         times = [status.st_mtime for status in self._list_status("*")]
         return max(0.0, now - max(times, default=now))
 
     def ended_well(self, number: int) -> bool:
-        """Return True if the listing of a leg reports its normal end."""
+        """Return True if the listing of an engine run reports a normal end."""
         return "NORMAL TERMINATION" in self._read_end(number, ".out")
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Return cycles and CPU time [s] of a leg; None if its listing does not contain them."""
+        """Return cycles and CPU time [s] of an engine run; None if its listing does not contain them."""
         path = str(self.file(number, ".out"))
         timing = find_radioss_timing(path, read_tail(path, _TAIL_SIZE))
         return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
-        """Return True if a leg, or the starter (number 0), has left complete restarts of all domains.
+        """Return True if an engine run, or the starter (number 0), has left complete restart files of all domains.
 
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -274,7 +274,7 @@ class Solver:
         return True
 
     def read_times(self, number: int) -> Samples:
-        """Return the times of the states in the history of a leg [time]; none if the history cannot be read."""
+        """Return the times of the states in the history of an engine run [time]; empty if it cannot be read."""
         path = self.history(number)
         try:
             return TimeHistory(path.read_bytes(), str(path)).time
@@ -282,7 +282,7 @@ class Solver:
             return np.empty(0)
 
     def started_well(self) -> bool:
-        """Return True if the starter has ended without an error and left a complete restart."""
+        """Return True if the starter has ended without an error and left a complete restart file."""
         has_error = re.search(_STARTER_ERROR, self._read_end(0, ".out"))
         return self.whole(0) and not has_error
 
@@ -303,13 +303,13 @@ class Solver:
         return ended + (make_printable(text) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
-        """Remove all restarts except those of these legs and of the starter."""
+        """Remove all restart files except those of the given engine runs and of the starter."""
         for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
             for path in self._find_restarts(number).values():
                 path.unlink()
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for leg ``number``; ``share`` of the run remains to compute."""
+        """Raise D2RPickError if the disk has no room for an engine run; the fraction ``share`` is still to compute."""
         written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
         to_come = round(written * share / max(1 - share, 0.1))
         needed = 2 * self._measure_largest_restart() + to_come
@@ -321,11 +321,11 @@ class Solver:
             )
 
     def _read_end(self, number: int, suffix: str, size: int = _TAIL_SIZE) -> str:
-        """Return the last bytes of a file of a leg as text; "" if it is missing."""
+        """Return the last bytes of a file of an engine run as text; empty if the file is missing."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
 
     def _find_restarts(self, number: int) -> dict[str, Path]:
-        """Return the restarts of a leg by their domains, the ends of their names."""
+        """Return the restart files of an engine run, keyed by domain, which is the end of the file name."""
         paths = self.folder.glob(f"{self.name}_{number:04d}_*.rst")
         return {path.name[-8:]: path for path in paths}
 
@@ -335,7 +335,7 @@ class Solver:
         return max(sizes, default=0)
 
     def _list_status(self, pattern: str) -> list[os.stat_result]:
-        """Return the status of the files whose names match the run's name followed by a pattern."""
+        """Return the status of the files whose names consist of the run's name and a pattern."""
         paths = self.folder.glob(f"{self.name}{pattern}")
         return [path.stat() for path in paths if path.exists()]
 
@@ -346,7 +346,7 @@ def _has_its_name(restart: Path) -> bool:
 
 
 def _raise_stack_limit() -> None:
-    """Raise the stack limit to the system's maximum, because the solver keeps large arrays on the stack."""
+    """Raise the stack limit to the maximum of the system, because the solver keeps large arrays on the stack."""
     import resource
 
     _, limit = resource.getrlimit(resource.RLIMIT_STACK)

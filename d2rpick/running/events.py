@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.running.witness import Quiet
 
-    # Events of past flights, keyed by the start of the flight and the time at which it was seen.
+    # Events of past flights, keyed by the start of the flight and the time at which it was detected.
     Decided = dict[tuple[float, float], tuple["Event", ...]]
 
-# tr is good if the internal energy is above its recent minimum by at least this share of its recent range [-].
+# Smallest height of the internal energy above its recent minimum at a good tr, as a fraction of its recent range [-].
 # In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak at least 90 %.
 _HIGH: Final = 0.75
 
@@ -44,7 +44,7 @@ class Event(NamedTuple):
 def find_events(
     evidence: GrowingEvidence, decided: Decided | None = None
 ) -> tuple[Event, ...]:
-    """Return all events in the order in which they were seen.
+    """Return all events in the order in which they were detected.
 
     The events of a run so far are the first ones of the whole run.  Flights in ``decided`` are not examined again, and
     those that are decided now are added to it.
@@ -66,7 +66,7 @@ def find_events(
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(history, flight, decided)
     for start, _, end in rigid_times:
-        # No switch is advised if the parts are rigid already.
+        # No switch is advised if the parts are already rigid.
         events = [
             event
             for event in events
@@ -114,7 +114,7 @@ def _describe_flight(
 
 
 def _describe_start(flight: Quiet) -> Event:
-    """Report that a flight is seen, which evidence shows it, and why it was not seen earlier."""
+    """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
     quantity = "contact energy"
     if flight.source == "momentum":
         quantity = "momentum less gravity"
@@ -131,7 +131,7 @@ def _describe_start(flight: Quiet) -> Event:
 
 
 def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise when to switch in a flight: at once if nothing vibrates, else while the internal energy is high.
+    """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
     """
@@ -170,7 +170,7 @@ def _advise(tr: float, seen: float, message: str, flight: Quiet) -> Event:
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise ""."""
+    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise empty."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

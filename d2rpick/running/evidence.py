@@ -51,23 +51,23 @@ class GrowingEvidence:
         self.motion = InnerMotion(self, given, of_deck, before)
         self._record = GrowingRecord()
         self._witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, keyed by the momentum columns of its parts; None stands for the whole model.
+        # Evidence that still grows, keyed by the momentum columns of its parts; the key of the whole model is None.
         self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved = RunningMaximum()
-        # For each state, True if the part momenta add up to the momentum of the model.
+        # True for each state at which the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
         self._largest_momentum = 0.0
         self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
     @property
     def history(self) -> History:
-        """All states so far."""
+        """All states read so far."""
         return self._record.history
 
     @property
     def witnesses(self) -> list[GrowingWitness]:
-        """Evidence of each set of parts, followed by that of the model if its momentum or contact energy is written."""
+        """Evidence for each set of parts, followed by that for the model if its momentum or contact energy is known."""
         return sorted(self._witnesses, key=_is_of_model)
 
     def take(self, states: History) -> None:
@@ -91,7 +91,7 @@ class GrowingEvidence:
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
     ) -> None:
-        """Append part momenta to the evidence of all sets of parts that may fly together.
+        """Append part momenta to the evidence for all sets of parts that may fly together.
 
         The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
         when a rigid body has absorbed some parts.
@@ -114,7 +114,7 @@ class GrowingEvidence:
         for members in dict.fromkeys(_list_sets(momenta)):
             columns = _make_columns(momenta.time, momenta.of(members), balance)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
-            # Once other parts move, the contact energy includes their contacts and is no longer used.
+            # Once other parts move, the contact energy includes their contacts, and is no longer used.
             other_parts = sorted({*range(len(momenta.parts))} - {*members})
             columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
             parts = tuple(momenta.parts[number] for number in members)
@@ -128,7 +128,7 @@ class GrowingEvidence:
         written: tuple[Momenta | None, Balance | None],
         is_used: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Append states to the evidence of a set of parts; after states that cannot be used, the evidence starts again.
+        """Append states to the evidence for a set of parts; after unusable states, the evidence starts again.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
@@ -187,7 +187,7 @@ class GrowingEvidence:
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
-        """Return the start of the force-free time that lasts up to a time; if there are no states, return the time."""
+        """Return the start of the force-free time that lasts up to a time; if there are no states, return that time."""
         starts = [time]
         for witness in self._witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
@@ -196,7 +196,7 @@ class GrowingEvidence:
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return all force-free times that ended after ``since``, before they were seen as flights."""
+        """Return all force-free times that ended after ``since`` without being detected as flights [time]."""
         for witness in sorted(self._going_on.values(), key=_is_of_model):
             return tuple(pause for pause in witness.pauses if pause[1] > since)
         return ()
@@ -249,7 +249,7 @@ def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quie
 
 
 def _is_of_model(witness: GrowingWitness) -> bool:
-    """Return True if the evidence concerns the model; such evidence is used after the evidence of parts."""
+    """Return True if the evidence concerns the whole model; such evidence is used after the evidence for parts."""
     return witness.parts is None
 
 
@@ -259,7 +259,7 @@ def _sample_states(first: int, last: int) -> Samples:
 
 
 def _make_columns(time: Samples, momentum: Samples, balance: Balance | None) -> Samples:
-    """Return time, contact energy and momentum as columns (k, 5). The energy is NaN if it is not written."""
+    """Return time, contact energy and momentum as columns (k, 5); the energy is NaN if it is not written."""
     contact = np.full(time.size, np.nan)
     if (
         balance is not None

@@ -48,10 +48,10 @@ if TYPE_CHECKING:
 
 # Number of engine files from which the OpenRadioss starter reads /RBODY/OFF.
 _MOST_LEGS: Final = 9
-# The largest time step while the parts are rigid is the force-free time that shows a flight, divided by this number.
-# A contact is therefore detected at most one such time step late.
+# Ratio of the force-free time that shows a flight to the largest time step while the parts are rigid [-].
+# With this time-step limit, a contact is detected at most one time step late.
 _STEPS_PER_WAIT: Final = 300
-# In LS-DYNA, contacts are ignored after a switch for the required force-free time divided by this number.
+# Ratio of the required force-free time to the time after a switch in which LS-DYNA ignores contacts [-].
 _DELAYS_PER_WAIT: Final = 100
 # Radioss keywords of loads that are no contact forces.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
@@ -135,7 +135,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given waiting time or half of the deck's longest period; raise ArgumentError if both are unknown."""
+    """Return the given waiting time, or half of the deck's longest period; raise ArgumentError if both are unknown."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
@@ -148,7 +148,7 @@ def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     return of_deck._replace(time=float(f"{of_deck.time:.3g}"))
 
 
-# The functions below write the cards of Radioss.
+# The functions below write the cards for Radioss.
 
 
 def _make_radioss_card(
@@ -246,7 +246,7 @@ def _explain_wait(wait: Wait) -> str:
     return f"force-free time that marks a flight: {wait.time:.4g}; {wait.reason}"
 
 
-# The functions below write the cards of LS-DYNA.
+# The functions below write the cards for LS-DYNA.
 
 
 def _make_ls_dyna_card(

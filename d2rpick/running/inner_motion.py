@@ -1,4 +1,4 @@
-"""Determine the waiting time (the force-free time that shows a flight) from the inner oscillations of the body.
+"""Determine the waiting time (the force-free time that shows a flight) from the internal oscillations of the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
 
-# A change of velocity is an oscillation if it exceeds this share of the velocity range so far [-].
+# Smallest velocity change that is an oscillation, as a fraction of the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: share of the change in a half period, at each end, that is not used to measure the half period [-].
-# _INNER_TIME: share of half its period that a harmonic motion takes for the middle part of the change [-].
+# _INNER: fraction of the change in a half period that is omitted at each end to measure the half period [-].
+# _INNER_TIME: fraction of half its period that a harmonic motion takes for the middle part of the change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# An oscillation is treated as a rotation of the body if its mean force is below this share of the largest so far [-].
+# Largest mean force of an oscillation treated as body rotation, as a fraction of the largest mean force so far [-].
 _ROTATION: Final = 0.05
-# A change within fewer states than this is treated as a jump, not as an oscillation.
+# Smallest number of states in an oscillation; a change within fewer states is treated as a jump.
 _FEWEST_STATES: Final = 4
-# A part oscillates only if its relative velocity exceeds this share of the velocity of all parts [-].
+# Smallest relative velocity of a part that oscillates, as a fraction of the velocity of all parts [-].
 _AT_REST: Final = 1e-3
-# The end of an oscillation is unknown once it lasts this many times as long as the longest earlier half period [-].
+# Ratio to the longest earlier half period above which the end of an oscillation is unknown [-].
 _MUCH_LONGER: Final = 2.0
-# _LONGEST_FREE: a longer free oscillation, in half periods according to the deck, is a rotation of the body [-].
-# _LONGEST_PUSHED: a longer oscillation under a load, in half periods according to the deck, is a rotation too [-].
+# _LONGEST_FREE: largest duration of a free oscillation that is no body rotation, in half periods of the deck [-].
+# _LONGEST_PUSHED: largest duration of an oscillation under load that is no body rotation, in half periods [-].
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# A given waiting time must be at least this share of half the longest period [-], which is uncertain by 10 %.
+# Smallest waiting time that the user may give, as a fraction of half the longest period [-], uncertain by 10 %.
 _EXACT: Final = 0.9
-# Parts with less than this share of the mass are ignored [-], because they hardly move the other parts.
+# Smallest mass fraction of parts that are considered [-], because lighter parts hardly move the other parts.
 _HEAVY: Final = 0.05
-# An internal energy below this share of the largest energy is round-off and shows no vibration [-].
+# Largest internal energy that is only round-off and shows no vibration, relative to the largest energy [-].
 _ROUND_OFF: Final = 1e-6
 
 
@@ -62,7 +62,7 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an inner motion, from ``begin`` to ``end``; it was detected at the time ``seen_at`` [time].
+    """Half a period of an internal motion, from ``begin`` to ``end``, detected at ``seen_at`` [time].
 
     ``half`` is half of its period [time], ``strength`` its mean change by time.
     """
@@ -82,14 +82,14 @@ class _Motion:
 
     def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
         self.name, self._factor = name, halves_per_swing
-        # The value is True once an unforced oscillation was seen.
+        # True once an unforced oscillation has been detected.
         self.has_free_swing = False
-        # The first half period has no duration; it ends when the motion is first seen.
+        # The first half period has no duration; it ends when the motion is first detected.
         self._swings: list[_HalfPeriod] = []
-        # The columns are time, value, and the smallest change that is an oscillation.
+        # The columns contain time, value, and the smallest change that is an oscillation.
         self._columns = GrowingColumn()
         self._highest, self._lowest = RunningMaximum(), RunningMaximum()
-        # State at the last turning point, state at the extreme since then, and direction (1 rising, -1 falling).
+        # State at the last extremum, state at the extreme value since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
     def covers(self, now: float) -> bool:
@@ -100,7 +100,7 @@ class _Motion:
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,) and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
+        """Append states (k,), and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
         ranges = self._highest.add(values) + self._lowest.add(-values)
         limits = np.maximum(_SWING * ranges, least_swing)
         first = self._columns.size
@@ -123,7 +123,7 @@ class _Motion:
                 self._sign = -self._sign
 
     def _begin(self, state: int) -> None:
-        """Begin to follow the motion, which is first seen at a state."""
+        """Begin to follow the motion, which is first detected at a state."""
         time, values, _ = self._columns.rows[: state + 1].T
         distance = np.abs(values - values[-1])
         self._turn = int(np.flatnonzero(distance == distance.max())[-1])
@@ -133,7 +133,7 @@ class _Motion:
         self._swings.append(_HalfPeriod(now, now, now))
 
     def _measure(self, state: int) -> _HalfPeriod:
-        """Measure the half period from the last turning point to the extreme value; it is detected at a later state."""
+        """Measure the half period from the last extremum to the extreme value; it is detected at a later state."""
         time, values, _ = self._columns.rows[self._turn : state + 1].T
         end = self._extreme - self._turn
         distance = np.abs(values[: end + 1] - values[0])
@@ -167,21 +167,21 @@ class _Motion:
 
 
 class EvidenceOfForces(Protocol):
-    """The part of the evidence of a growing record that is needed to follow inner motion."""
+    """The part of the evidence of a growing record that is needed to follow internal motion."""
 
-    # Slices of the latest states, each with the columns of the parts that move in it; () if there are no momenta.
+    # Slices of the latest states, each with the columns of the parts that move in it; empty if there are no momenta.
     moving: list[tuple[slice, tuple[int, ...]]]
 
     @property
     def history(self) -> History:
-        """All states so far."""
+        """All states read so far."""
 
     def free_since(self, time: float) -> float:
         """Return when the force-free time that lasts up to a time began [time]."""
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the inner motion so far [time], and the part or energy that showed it.
+    """The longest half period of the internal motion so far [time], and the part or energy that showed it.
 
     ``since`` is the time of detection, ``over`` the end of the half period. ``strength`` is the largest mean rate of
     change so far. ``swing`` is half of the longest swing, even if a force pushed the swing [time].
@@ -196,7 +196,7 @@ class _Longest(NamedTuple):
 
 
 class InnerMotion:
-    """The waiting time at each state of a record, from the inner motion up to that state.
+    """The waiting time at each state of a record, from the internal motion up to that state.
 
     ``evidence`` shows which parts move, and since when no force has acted.
     ``given`` is the user's waiting time, ``of_deck`` the deck's, ``before`` that of earlier flights [time].
@@ -222,7 +222,7 @@ class InnerMotion:
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
-        # Longest half periods in the order in which they became known.
+        # Longest half period of any part so far, with one entry for each time at which it grew.
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
@@ -318,7 +318,7 @@ class InnerMotion:
         return longest
 
     def longest(self, now: float) -> Wait | None:
-        """Return the longest half period known ``now``, from the deck or from the record so far."""
+        """Return the longest half period known at the time ``now``, from the deck or from the record so far."""
         longest = self._get_longest(now)
         if longest.half <= (self._least.time if self._least else 0.0):
             return self._least
@@ -326,7 +326,7 @@ class InnerMotion:
         return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
-        """Return the longest half period known ``now``, even if a push lengthened it [time]."""
+        """Return the longest half period known at the time ``now``, even if a push lengthened it [time]."""
         least = self._least.time if self._least else 0.0
         return max(self._get_longest(now).swing, least)
 

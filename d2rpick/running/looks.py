@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
     from d2rpick.running.record import Table
 
-# A record with fewer states than this is read completely each time, because early results may still change.
+# Number of states below which a record is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
@@ -36,7 +36,7 @@ class Looks:
     ) -> None:
         self._selection, self._inventory = selection, inventory
         self._last_states: list[Table] = []
-        # For each file, where the next read continues, and all files of the last read.
+        # Place in each file where the next read continues, and all files of the last read.
         self._resume_points: dict[str, ResumePoint] = {}
         self._names: frozenset[str] = frozenset()
 
@@ -46,7 +46,7 @@ class Looks:
         return bool(self._resume_points)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Read the new states, and report whether they follow those read before.
+        """Read the new states, and return them with True if they follow the states read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -73,7 +73,7 @@ class Looks:
         return new_states, follows
 
     def _read_whole(self, names: Sequence[str]) -> History:
-        """Read all states of the files; errors as `new_states`."""
+        """Read all states of the files, with the errors of `new_states`."""
         sources = open_files(names)
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)
@@ -82,7 +82,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, including known states, and new files completely.
+        """Read the last states of each file, including known states, and read new files completely.
 
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
         be read from its resume point, as when it was written anew.
@@ -108,7 +108,7 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in the files, except an incomplete last state, and where to continue in the files.
+        """Return the history in the files, without an incomplete last state, and where to continue in each file.
 
         The places are {} if the format of a file is always read as a whole.
         """
@@ -124,7 +124,7 @@ class Looks:
 
 
 def _find_resume_points(run: OpenedRun) -> dict[str, ResumePoint]:
-    """Return where to continue in the files of a run; {} if a file has a format that is always read completely."""
+    """Return the places where to continue in the files of a run; empty if a format is always read completely."""
     points: dict[str, ResumePoint] = {}
     for database in run.databases:
         points_of_format = database.find_resume_points()

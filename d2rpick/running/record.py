@@ -1,4 +1,4 @@
-"""Keep the record of a run that is being computed, to which each read appends states."""
+"""Keep the record of a run that is being computed; each read appends states to the record."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 # Number of rows for which a new column reserves memory.
 _FEWEST_ROWS: Final = 64
-# Two states are different if their times differ by more than this many units of the last printed digit.
+# Smallest time difference of two different states, in units of the last printed digit [-].
 _APART: Final = 1.5
-# Tolerance for a value that is read twice, as a share of the largest value [-]; sums over parts may be rounded.
+# Tolerance for a value that is read twice, as a fraction of the largest value [-]; sums over parts may be rounded.
 _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array that grows by rows and is copied only when its capacity doubles."""
+    """An array to which rows are appended; it is copied only when its capacity is doubled."""
 
     def __init__(self) -> None:
         self._room: NDArray[Any] = np.empty(0)
@@ -96,7 +96,7 @@ class GrowingRecord:
 
 
 def _list_tables(history: History) -> list[Table]:
-    """Return the history itself, each of its momenta, and its balance if there is one."""
+    """Return the history itself, each of its momenta, and its balance if it has one."""
     tables: list[Table] = [history, *history.momenta]
     if history.balance:
         tables.append(history.balance)

@@ -1,4 +1,4 @@
-"""Choose the next leg of a first run that switches its parts by itself, from the results of the legs so far.
+"""Choose the next engine run (leg) of a first run that switches its parts by itself, from the results so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
 machine is.  A leg that replaces a discarded one gets its number.
@@ -16,39 +16,39 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# The kinds of a leg (an engine run of Radioss) are the following three.
+# Each engine run (leg) of a first run is of one of three kinds.
 # LOAD: the parts are deformable.
-# PROBE: the parts are rigid, and the leg continues until it shows the contact that ends the flight.
-# RIGID: the parts are rigid, and the leg ends at td, which a probe has determined.
+# PROBE: the parts are rigid, and the engine run continues until it shows the contact that ends the flight.
+# RIGID: the parts are rigid, and the engine run ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Two times are equal if they differ by less than this number of output intervals.
+# Largest difference of times that are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# No further flight is switched once only this many leg numbers are left, so that the run can reach its end.
+# Number of remaining engine-run numbers at which no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
-# Shortest deformable leg in a flight, as a share of the force-free time that shows a flight [-].
+# Shortest deformable engine run in a flight, as a fraction of the force-free time that shows a flight [-].
 _LEAST: Final = 0.25
-# Length of a deformable leg while the period of the vibration is unknown, as a share of the run [-].
+# Length of a deformable engine run while the period of the vibration is unknown, as a fraction of the run [-].
 _UNKNOWN: Final = 0.02
-# A longer probe computes more after the contact, and a shorter probe needs more restarts.
-# _OF_FLOWN: smallest length of a probe as a share of its rigid time so far [-].
-# _OF_RUN: smallest length of a probe as a share of the run [-].
+# A longer probe computes more after the contact, whereas a shorter probe needs more restarts.
+# _OF_FLOWN: smallest length of a probe as a fraction of its rigid time so far [-].
+# _OF_RUN: smallest length of a probe as a fraction of the run [-].
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
 # Assumed cost of writing and reading a restart file, in deformable cycles; about 5 were measured.
 _RESTART: Final = 10
 # Shortest flight that is switched, in half periods of its slowest vibration [-].
-# In shorter flights, freezing the vibration changes the time of the landing too much.
+# In shorter flights, freezing the vibration shifts the landing too much.
 # After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
 # After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
 _SWINGS: Final = 3.0
-# Smallest share of the cost of a deformable run that a window must save [-].
-# Smaller savings are not worth the change of later landings, which was up to 37 ms in two computed boxes.
+# Smallest saving of a window, as a fraction of the cost of a deformable run [-].
+# Smaller savings are not worth the shift of later landings, which was up to 37 ms in two computed boxes.
 _WORTH: Final = 0.04
 
 
 class Limits(NamedTuple):
-    """Limits that apply to all legs [time].
+    """Limits that apply to all engine runs [time].
 
     ``interval`` is the interval of the history, ``shortest`` the least margin, ``margin`` the one the user gave.
     ``rigid_cycle`` is the cost of a cycle with rigid parts over the cost of a deformable cycle [-].
@@ -64,7 +64,7 @@ class Limits(NamedTuple):
         """Return the margin before the contact that ends a flight of this length [time].
 
         If nothing vibrates (``idle``), a rigid body flies like the deformable one, and the least margin is enough.
-        Otherwise the margin is at least a share of the flight that was enough in 8 windows of two structures.
+        Otherwise the margin is at least a fraction of the flight that was enough in 8 windows of two structures.
         """
         if self.margin is not None:
             return self.margin
@@ -78,12 +78,12 @@ class Limits(NamedTuple):
         return _STATES * self.interval
 
     def until_end(self, until: float) -> float:
-        """Return ``until``, or the end of the run if ``until`` is close to it [time]."""
+        """Return ``until``, or the end of the run if ``until`` is close to that [time]."""
         return until if until < self.end - self.same else self.end
 
 
 class Order(NamedTuple):
-    """A leg to be computed, from the end of the leg before it to ``until`` [time].
+    """An engine run to be computed, from the end of the previous engine run to ``until`` [time].
 
     Flights that began before ``switch_after`` are no longer switched [time].
     """
@@ -96,16 +96,16 @@ class Order(NamedTuple):
 
     @property
     def rigid(self) -> bool:
-        """Return True if the parts are rigid in this leg."""
+        """Return True if the parts are rigid in this engine run."""
         return self.kind in RIGID_KINDS
 
     def following(self, kind: str, until: float) -> Order:
-        """Return the order for a leg that begins at the end of this leg."""
+        """Return the request for an engine run that begins at the end of this one."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
 class LegFindings(NamedTuple):
-    """The findings from the record up to the end of a leg.
+    """The findings from the record up to the end of an engine run.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed leg, with its ``cycles`` and CPU time ``cpu`` [s], which are None if its listing lacks them."""
+    """A computed engine run, with its ``cycles`` and CPU time ``cpu`` [s], which are None if its listing lacks them."""
 
     order: Order
     findings: LegFindings
@@ -156,12 +156,12 @@ class Leg(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Kind of the leg: load, probe or rigid."""
+        """Kind of the engine run: load, probe or rigid."""
         return self.order.kind
 
     @property
     def length(self) -> float:
-        """Duration of the leg [time]."""
+        """Duration of the engine run [time]."""
         return self.order.until - self.order.start
 
 
@@ -182,14 +182,14 @@ class Window(NamedTuple):
 
 
 def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    """Choose the next leg; None once the run is complete.
+    """Choose the next engine run; None once the run is complete.
 
     Raises
     ------
     D2RPickError
         If the solver has no number for one more leg.
     """
-    if not legs:  # This leg has enough states to show whether parts at rest fall.
+    if not legs:  # The first engine run can show whether parts at rest fall.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last, findings = legs[-1].order, legs[-1].findings
     if findings.contact is not None:
@@ -210,7 +210,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
 
 
 def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order a probe if a flight was seen and can still pay off, else one more deformable leg."""
+    """Schedule a probe if a flight was detected and can still pay off, otherwise one more deformable engine run."""
     last, findings = legs[-1].order, legs[-1].findings
     switches = (
         findings.flies
@@ -221,18 +221,18 @@ def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
     if not switches:
         return _order_load(last, findings, limits)
     if not findings.idle and findings.tr <= last.start:
-        # The energy was higher at the start of the leg, so the probe begins there and replaces the leg.
+        # The energy was higher at the start of the engine run, so the probe begins there and replaces the engine run.
         last = last._replace(number=last.number - 1, until=last.start)
     return _order_probe(last, legs, limits)
 
 
 def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Return the order for a deformable leg after td. The flight in which the window ends is not switched again."""
+    """Schedule a deformable engine run after td. The flight in which the window ends is not switched again."""
     return _order_load(last, findings, limits)._replace(switch_after=last.until)
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Order a deformable leg that ends as soon as a current or past flight has lasted for the required time."""
+    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time."""
     now, end = last.until, limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
@@ -247,7 +247,7 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
 
 def _order_probe(last: Order, legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order the next leg of a probe, which begins at the end of ``last`` or has begun in an earlier leg."""
+    """Schedule the next part of a probe, which begins at the end of ``last`` or has begun earlier."""
     now = last.until
     flown = now - _get_first_rigid_leg(legs).start if last.rigid else 0.0
     length = max(
@@ -260,7 +260,7 @@ def _order_probe(last: Order, legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Order the leg that ends the window at its td. If the window does not pay off, order a deformable leg instead."""
+    """Schedule the engine run that ends the window at its td, or a deformable one if the window does not pay off."""
     window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
     findings = get_flight_findings(legs)
     if window.reason:
@@ -279,7 +279,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Return the window before the contact that the last leg showed; if it showed none, up to the end of the run."""
+    """Return the window before the contact that the last engine run showed, or else up to the end of the run."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     free, wait = findings.free, findings.wait or 0.0
@@ -293,7 +293,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     td = contact - limits.margin_of(contact - free, idle=findings.idle)
     for order in rigid_orders:
         if 0 <= td - order.until <= limits.same:
-            td = order.until  # A leg must have at least two states.
+            td = order.until  # An engine run must have at least two states.
     reason = _explain_too_little_saved(legs, tr, td, limits)
     if not findings.idle and contact - free < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
@@ -325,7 +325,7 @@ def _explain_too_little_saved(
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Return the legs since the parts last became rigid or deformable, up to and including a given leg."""
+    """Return the engine runs since the parts last became rigid or deformable, up to and including a given one."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
     while (previous := latest.get(joined[0].number - 1)) and (
@@ -336,17 +336,17 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
-    """Return the leg in which the parts became rigid, if they are still rigid in the last leg."""
+    """Return the engine run in which the parts became rigid, if they are still rigid in the last engine run."""
     return collect_joined_legs(legs[-1].order, legs)[0]
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the findings about the flight at the end of the last deformable leg, when the flight was switched."""
+    """Return the findings about the flight at the end of the last deformable engine run, when it was switched."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """List all flights so far, switched or left out, in the order of their starts."""
+    """Return all flights so far, switched or left out, in the order of their starts."""
     by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:

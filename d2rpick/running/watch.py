@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.running.events import Decided
 
-# Largest share of the time of a processor core that reading may take [-].
+# Largest fraction of the time of a processor core that reading may take [-].
 _SHARE: Final = 0.01
 # _SHORTEST: shortest pause between two reads [s].
 # _LONGEST: longest pause between two reads that cover only new states [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
-# A run is reported as silent if it writes nothing for this time [s].
+# Time without output after which a run is reported as silent [s].
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
@@ -80,7 +80,7 @@ class Watch:
         self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
-        """Return the events since the last read; a run that has not begun has none.
+        """Return the events since the last read; empty for a run that has not begun.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class Watch:
         return self._looks.grow
 
     def state(self) -> Event:
-        """Return a sentence on whether the parts fly now, and since when."""
+        """Return a sentence that states whether the parts fly now, and since when."""
         time, message = None, "no flight yet"
         if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
@@ -169,7 +169,7 @@ class Watch:
         yield from events[kept_count:]
 
     def _check_end(self, name: str) -> Iterator[Event]:
-        """Report once that the run has ended, if the listing next to its last file says so."""
+        """Report once that the run has ended, if the listing next to its last file shows this."""
         self.ended = _PACKED if name.endswith(".gz") else find_ending(name)
         if self.ended:
             event = "failed" if self.ended == WITH_AN_ERROR else "ended"
@@ -210,7 +210,7 @@ def follow(
 
 
 def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
-    """Return the non-empty files of a run, including those of later legs in the same folder, with their stamps."""
+    """Return the non-empty files of a run, including those of later engine runs in the folder, with stamps."""
     try:
         paths = expand(names)
     except FormatError as error:

@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-    # Function that returns the waiting time for a flight since ``start``, from the states up to ``now``, or None.
+    # A function that returns the waiting time for a flight since ``start``, from the states up to ``now``, or None.
     Needed = Callable[[float, float], Wait | None]
 
-# A momentum or contact energy is constant if it changes by less than this share of its largest value so far [-].
+# Largest change of a constant momentum or contact energy, as a fraction of its largest value so far [-].
 # CONSTANT is 10 times the error of sums in single precision.
 CONSTANT: Final = 1e-4
-# Time from one test for a force to the next, as a share of the force-free time so far [-].
+# Time from one test for a force to the next, as a fraction of the force-free time so far [-].
 _TEST_AGAIN: Final = 0.25
-# Number of states at which a long window is compared with the law, which suffices as a force has a lasting effect.
+# Number of states of a long window that are compared with the law; few suffice, as a force has a lasting effect.
 _MOST_COMPARED: Final = 128
 
 
@@ -77,7 +77,7 @@ class Quiet(NamedTuple):
 
 
 class _SampledFall(FreeFall):
-    """The law of free fall, compared with a sample of the states of a long window."""
+    """Comparison of the law of free fall with a sample of the states in a long window."""
 
     def _select_states(self, first: int, last: int) -> NDArray[np.intp]:
         count = min(last - first + 1, _MOST_COMPARED)
@@ -108,7 +108,7 @@ class GrowingWitness:
         self.pauses: list[tuple[float, float]] = []
         self._columns = GrowingColumn()
         self._laws: list[tuple[Law, Samples]] = []
-        # For each state, True if the printed digits are precise enough to show a force.
+        # True for each state at which the printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         # Start of the force-free time that lasts at the last examined state [time].
         self._start = 0.0
@@ -125,7 +125,7 @@ class GrowingWitness:
         momentum_precision: Precision,
         contact_precision: Precision,
     ) -> None:
-        """Append states, and find the force-free time at each.
+        """Append states, and find the force-free time at each of them.
 
         ``columns`` (k, 5) are time, contact energy (NaN where it is not used), and momentum.
         """
@@ -150,7 +150,7 @@ class GrowingWitness:
             self.free.append(first)
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the unexplained change between two states over its tolerance [-]. A force acts if this exceeds 1."""
+        """Return the unexplained change between two states over its tolerance [-]; a force acts if it exceeds 1."""
         return max(
             law.misfit(first, last) / float(tolerance[last])
             for law, tolerance in self._laws
@@ -198,7 +198,7 @@ class GrowingWitness:
         self._examined_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
-        """Add a flight since ``first`` that is seen at a state; if ``gravity`` is None, only schedule the next test."""
+        """Record a flight since ``first`` that is detected now; without ``gravity``, only schedule a new test."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return

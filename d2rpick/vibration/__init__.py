@@ -1,4 +1,4 @@
-"""Identify the vibration: find the models that describe it, best first.
+"""Identify the vibration: find the models that describe it, with the best model first.
 
 Every measure of a pair (tr, td) needs the deformations at both times and their relative direction (`measures`).  The
 energy does not show the sign of a deformation, so a model must.  `span` and `find_models` look for one in this order,
@@ -43,12 +43,12 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-# Names of the models, best first.
+# Names of the models, with the best model first.
 MODELS: Final = ("oscillator", "modal", "swings", "energy")
 
 
 class VibratingTogether(Protocol):
-    """The chosen parts and all parts that vibrate with them in a flight."""
+    """The chosen parts and all parts that vibrate together with them in a flight."""
 
     @property
     def complete(self) -> bool:
@@ -56,7 +56,7 @@ class VibratingTogether(Protocol):
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return times and energies (n,) of the kinetic vibration energy in the flight; None if unknown."""
+        """Return times and kinetic vibration energies (n,) in the flight [time], [energy]; None if unknown."""
 
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # If the modes are very uncertain, counted half cycles of the energy may be more accurate.
+        # If the modes are very uncertain, counting half cycles of the energy may be more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])
@@ -91,7 +91,7 @@ def find_models(
 def _find_modal(
     history: History, first: float, last: float, *, together: VibratingTogether
 ) -> ModalVibration | None:
-    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
+    """Identify the modes of the structure from the spectral lines of its internal and (if known) kinetic energy."""
     if not together.complete:
         return None
     from d2rpick.vibration.modal import confirm_by_kinetic_energy, identify_modal

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class SignedAmplitudes:
-    """A deformation that is given by the signed ``amplitudes`` of its modes."""
+    """A deformation that is defined by the signed ``amplitudes`` of its modes."""
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Return signed deformations, with the shape of ``t`` and a first axis for modes [sqrt(energy)]."""

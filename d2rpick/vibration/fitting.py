@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-    # Energies (n,) at n times, and their derivatives (p, n) with respect to the first p parameters.
+    # A function that returns energies (n,) at n times, and their derivatives (p, n) with respect to p parameters.
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 
@@ -35,7 +35,7 @@ VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6
 
 # Numbers of exponentials in q**2 that the matrix-pencil method tries, one for each of the three models.
 _ORDERS: Final = (3, 4, 6)
-# Window length of the matrix-pencil method [cells], 1/3 of _MIN_CELLS so that noise causes the smallest error.
+# Window length of the matrix-pencil method [cells]; with 1/3 of _MIN_CELLS, noise causes the smallest error.
 _LAGS: Final = 64
 # Smallest number of cells into which the record is divided.
 _MIN_CELLS: Final = 192
@@ -44,11 +44,11 @@ _MAX_CELLS: Final = 8192
 # Smallest number of cells per period of the strongest oscillation of the energy.
 _CELLS_PER_PERIOD: Final = 24
 
-# Number of samples with which start values are compared and first refined.
+# Number of samples with which start values are compared and refined at first.
 COARSE: Final = 400
 # Number of samples with which a fit may be refused before all samples are used.
 _MEDIUM: Final = 2048
-# The refinement stops if it reduces the misfit by less than this share [-].
+# Relative decrease of the misfit in a step below which the refinement stops [-].
 _NEAR: Final = 1e-6
 # Largest rms misfit relative to the standard deviation of the energy [-]; a larger misfit may hide another mode.
 MAX_MISFIT: Final = 0.4
@@ -56,29 +56,29 @@ MAX_MISFIT: Final = 0.4
 _FAR_TOO_MUCH: Final = 1.2
 # Largest number of start values that are refined, because the first value may not be the best.
 STARTS: Final = 3
-# No second start value is tried if the first one leaves less than this share of the variance unexplained [-].
+# Unexplained fraction of the variance below which no second start value is tried [-].
 CERTAIN: Final = 0.01
 _MAX_STEPS: Final = 40
-# A fit to some of the samples is a drift, not a vibration, if it has less than 1/10 period in the record [rad].
-# None of 1,100 such fits became a vibration when the fit was refined with all samples.
+# Smallest phase of a vibration over the record [rad], 1/10 period; a fit with less is only a drift.
+# None of 1,100 drifts became a vibration when the fit was refined with all samples.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
-# A parameter has no effect if the derivatives of the scaled energy with respect to it are smaller than this [-].
+# Smallest derivative of the scaled energy with respect to a parameter that has an effect [-].
 _NO_EFFECT: Final = 1e-100
 # Largest part of the misfit that neighbouring samples share, relative to the standard deviation of the energy [-].
 MAX_STRUCTURE: Final = 0.02
-# A misfit has structure if its covariance exceeds that of white noise by this many standard deviations.
+# Excess of a misfit's covariance over that of white noise above which the misfit has structure [standard deviations].
 _DEVIATIONS: Final = 3.0
-# The structure of a misfit is certain if its covariance exceeds that of white noise by this many standard deviations.
+# Excess of the covariance over that of white noise at which the structure is certain [standard deviations].
 _BEYOND_DOUBT: Final = 6.0
-# All samples would refuse a fit if the structure with few samples exceeds MAX_STRUCTURE by this factor [-].
+# Ratio of the misfit structure in few samples to MAX_STRUCTURE above which a fit to all samples would fail [-].
 _BEYOND_STRUCTURE: Final = 2.0
 
 
 def fit_few(
     poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float
 ) -> Samples | None:
-    """Return least-squares parameters for a selection of samples: the first ``size`` are free, the others zero.
+    """Return least-squares parameters for a selection of samples: the first ``size`` are free, the others are zero.
 
     None if the fit leaves more than ``worst`` of the variance or, if ``worst`` is finite, too much structure.
     """
@@ -96,7 +96,7 @@ def fit_few(
 def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
-    """Fit all samples, starting from the parameters of `fit_few`; None if the fit leaves too large a misfit."""
+    """Fit all samples, starting from the parameters of `fit_few`; None if the misfit is too large."""
     best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
@@ -134,7 +134,7 @@ def fit_all(
 
 
 def _is_drift(parameters: Samples) -> bool:
-    """Return True if the rate is so low that the fit remains a drift even with all samples."""
+    """Return True if the frequency is so low that the fit remains a drift even with all samples."""
     return bool(abs(parameters[0]) < _DRIFT)
 
 
@@ -147,7 +147,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Refine the starts and return the best result; None if each leaves more than ``worst`` of the variance."""
+    """Refine the start values and return the best result; None if all leave more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance
@@ -161,7 +161,7 @@ def refine(
 
 
 def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Return True if the misfit on evenly spaced samples is enough to refuse the fit to all samples."""
+    """Return True if the misfit on evenly spaced samples suffices to refuse the fit to all samples."""
     return has_clear_structure(e - model(parameters, s)[0], float(np.std(e)))
 
 
@@ -178,7 +178,7 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Compute the singular vectors in descending order of their share of the energy."""
+        """Compute the singular vectors in descending order of their contribution to the energy."""
         running = integrate_by_trapezia(s, e)
         fine = average_cells(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
@@ -195,7 +195,7 @@ class Pencil(NamedTuple):
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
     def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
-        """Return the complex rates p of the oscillating terms exp(p s) that the energy may contain.
+        """Return the complex exponents p of the oscillating terms exp(p s) that the energy may contain.
 
         The real part of p is minus the damping, the imaginary part is the positive frequency.
 
@@ -206,7 +206,7 @@ class Pencil(NamedTuple):
 
 
 def find_factors(vectors: Samples) -> NDArray[np.complex128]:
-    """Return the factors z of exponentials z**k; ``vectors`` (n, order) span the windows of these over k.
+    """Return the factors z of exponentials z**k whose windows over k are spanned by ``vectors`` (n, order).
 
     A shift by one maps the space of the windows to itself; the factors are the eigenvalues.
     """
@@ -260,16 +260,16 @@ def _find_starts(
     )
     misfit = np.sum((e - (linear[:, None] @ basis)[:, 0]) ** 2, axis=1)
     linear = np.pad(linear, ((0, 0), (0, 6 - linear.shape[1])))
-    # The fitted coefficients of the double rate are (cosine + i sine)**2 / 2.
+    # The fitted coefficients at the double frequency are (cosine + i sine)**2 / 2.
     phasor = np.sqrt(2 * (linear[:, 1] + 1j * linear[:, 2]))
-    # The fitted coefficients of the single rate are 2 preload (cosine + i sine).
+    # The fitted coefficients at the single frequency are 2 preload (cosine + i sine).
     mixed = linear[:, 4] + 1j * linear[:, 5]
     preload = (mixed * phasor.conj()).real / (2 * np.abs(phasor) ** 2 + 1e-12)
     plastic = linear[:, 3] - preload**2
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
-        # Two starts whose rates differ by less than half a radian over the record lead to the same minimum.
+        # Two start values lead to the same minimum if their phases differ by less than half a radian over the record.
         if all(
             abs(start[0] - start_before[0]) > 0.5
             or abs(start[1] - start_before[1]) > 0.5
@@ -324,7 +324,7 @@ def refine_parameters(
 def _build_normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
-    """Return the squared misfit, the matrix J J^T of the derivatives J, and J times the misfit, block by block."""
+    """Return the squared misfit, the matrix J J^T of the derivatives J, and J times the misfit, computed by blocks."""
     cost = 0.0
     normal = np.zeros(())
     gradient = np.zeros(())
@@ -341,7 +341,7 @@ def _build_normal_equations(
 def evaluate_energies(
     parameters: Samples, model: Model, s: Samples
 ) -> tuple[Samples, Samples]:
-    """Return energies (n,) and the matrix J J^T (p, p) of their derivatives J, block by block to save memory."""
+    """Return energies (n,) and the matrix J J^T (p, p) of their derivatives J, computed by blocks to save memory."""
     energy = np.empty(s.size)
     normal = np.zeros(())
     for first in range(0, s.size, BLOCK):
@@ -361,13 +361,13 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the rms of what neighbouring values of ``rest`` share, beyond ``deviations`` standard deviations of noise.
+    """Return the rms of the part shared by neighbouring values of ``rest``, beyond ``deviations`` of noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """
 
     def excess(products: Samples) -> float:
-        """Return how far the sum of products of neighbouring misfits exceeds the limit for white noise."""
+        """Return by how much the sum of products of neighbouring misfits exceeds the limit for white noise."""
         return abs(float(np.sum(products))) - deviations * float(
             np.linalg.norm(products)
         )
@@ -377,7 +377,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
 
 def has_clear_structure(rest: Samples, spread: float) -> bool:
-    """Return True if the misfit on evenly spaced samples has so much structure that all samples would refuse the fit.
+    """Return True if the misfit on evenly spaced samples has enough structure that all samples would refuse the fit.
 
     ``spread`` is the standard deviation of the energy there.
     """

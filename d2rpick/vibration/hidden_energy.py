@@ -11,9 +11,9 @@ from d2rpick.vibration.locked_lines import ABOVE_SCATTER
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
-# The level of a vibration is constant if it varies by less than this share [-], which single precision cannot resolve.
+# Largest relative variation of a constant level [-], which single precision cannot resolve.
 _RESOLVED: Final = 2e-7
-# _LIKE_LEVEL: a static energy falls as the vibration does if the rest of its variation is below this share [-].
+# _LIKE_LEVEL: largest part of the variation of a static energy that does not fall with the level, as a fraction [-].
 # _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
 _LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
 # Assumed number of lines that are hidden in the misfit.
@@ -25,8 +25,8 @@ def measure_hidden_pairs(
 ) -> float:
     """Return the vibration energy that falls as the ``level`` does but has no lines, relative to the level [-].
 
-    The lines of two modes with equal rates and opposite phases cancel each other, so their energy looks static.  A
-    static energy stays as it is, while that of modes decays with all others.
+    The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
+    But static energy stays as it is, while that of modes decays with all others.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def measure_hidden_pairs(
     noise : float
         Standard deviation of the record about its lines [energy].
     systematic : float
-        Share of the misfit that neighbouring states have in common [-].
+        Fraction of the misfit that neighbouring states have in common [-].
     """
     fallen = level - np.mean(level)
     variance = float(np.mean(fallen**2))

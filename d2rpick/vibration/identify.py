@@ -1,4 +1,4 @@
-"""Identify the single vibration mode in an internal energy history, or give the reason why there is none."""
+"""Identify the single vibration mode in an internal energy history, or find the reason why there is none."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# A fit to 400 samples is refused at once if it leaves more than this share of the variance unexplained [-].
+# Unexplained fraction of the variance above which a fit to 400 samples is refused at once [-].
 HOPELESS: Final = 0.5**2
-# A structure of the misfit above this share of the fitted energy at the same time shows a second mode [-].
+# Largest structure of the misfit without a second mode, as a fraction of the fitted energy at the same time [-].
 MAX_LOCAL_STRUCTURE: Final = 0.1
-# Smallest number of samples, which is four for each parameter of the largest model.
+# Smallest number of samples; it is four for each parameter of the largest model.
 MIN_SAMPLES: Final = 24
-# Smallest number of samples per energy period pi / omega, so that aliasing does not make a fast mode look slow.
+# Smallest number of samples per energy period pi / omega; with fewer, aliasing may make a fast mode look slow.
 MIN_SAMPLES_PER_PERIOD: Final = 10
-# Largest growth -alpha t over the length t of the record [-]; noise may make a vibration seem to grow.
+# Largest growth exponent -alpha t over the length t of the record [-]; noise may cause an apparent growth.
 MAX_GROWTH: Final = 0.3
-# Most negative plastic work, as a share of the energy range [-]; fitting errors may make it negative.
+# Most negative plastic work, as a fraction of the energy range [-]; fitting errors may make it negative.
 MIN_PLASTIC: Final = -0.05
-# A larger misfit of a vibration without preload is not attributed to a stiffening spring [-].
+# Largest misfit of a vibration without preload that is attributed to a stiffening spring [-].
 MAX_OF_SPRING: Final = 0.1
-# Assumed hidden share of the vibration energy if a preload is replaced with a stiffening spring [-].
+# Assumed hidden fraction of the vibration energy if a preload is replaced with a stiffening spring [-].
 _OF_A_PRELOAD: Final = 0.03
 
-# For each model, beginning with the simplest, its number of parameters and the number of periods needed to identify it.
+# Number of parameters of each model, and number of periods needed to identify it, with the simplest model first.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -49,7 +49,7 @@ _MODELS: Final = (
 
 
 class Identification(NamedTuple):
-    """A mode fitted to an energy history, and whether it describes the history.
+    """A mode fitted to an energy history, and whether the mode describes the history.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Identification(NamedTuple):
     vibration : float
         Root mean square of the vibration energy over the window [energy]; NaN if there is no mode.
     hidden_share : float
-        Share of the vibration energy that a hidden further mode may have [-]; zero if no further mode was tested.
+        Fraction of the vibration energy that a hidden further mode may have [-]; zero if no further mode was tested.
     deviation_times, deviations : array of shape (d,)
         How far the energy is off the fit at some times, beyond noise [time], [energy]; empty if it was not measured.
     follows : bool
@@ -179,7 +179,7 @@ def identify(
 
 
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
-    """Return the complex rates of the exponentials that E may contain, in units of the record's length, shape (k,).
+    """Return the complex exponents of the exponentials that E may contain, per length of the record, shape (k,).
 
     A record that is too short to be judged has none.
     """
@@ -192,7 +192,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge the fits, beginning with the simplest, and return the first that follows the samples, else the best one.
+    """Judge the fits, simplest model first, and return the first one that follows the samples, else the best one.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
@@ -211,7 +211,7 @@ def _choose_first_to_follow(
 def _prefer_through_zero(
     found: Identification, simple: list[Identification]
 ) -> Identification:
-    """Replace a vibration about a preload with one through zero at half its rate, if both fit almost equally well.
+    """Replace a vibration about a preload with one through zero at half its frequency, if both fit almost equally well.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
@@ -245,7 +245,7 @@ def _is_out_of_reach(time: Samples) -> Identification:
 def judge_given(
     mode: Mode, time: Samples, energy: Samples, *, quick: bool = False
 ) -> Identification:
-    """Compare a given mode with a record. It must follow the samples as closely as a fitted mode.
+    """Compare a given mode with a record. The mode must follow the samples as closely as a fitted mode.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
     """
@@ -298,14 +298,14 @@ class _Record(NamedTuple):
 
     @property
     def units(self) -> Samples:
-        """Return the units of the fit parameters in the units of the record."""
+        """Return the units of the fit parameters in terms of the units of the record."""
         rate = 1 / (self.end - self.start)
         root = self.scale**0.5
         return np.array([rate, rate, root, root, self.scale, root])
 
 
 def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
-    """Return a refusal if the record is too short to be judged, else None."""
+    """Return a refusal if the record is too short to be judged, otherwise None."""
     if time.size < MIN_SAMPLES:
         states_text = "1 state" if time.size == 1 else f"{time.size} states"
         return _refuse_without_fit(
@@ -322,7 +322,7 @@ def _refuse_short_record(time: Samples, energy: Samples) -> Identification | Non
 
 
 class _Attempt(NamedTuple):
-    """A fit, scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives."""
+    """A fit, scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives J."""
 
     scaled: Mode
     mode: Mode
@@ -344,12 +344,12 @@ def _evaluate_attempt(parameters: Samples, size: int, record: _Record) -> _Attem
 def _judge_attempt(
     attempt: _Attempt, least_periods: float, record: _Record
 ) -> Identification:
-    """Return a fit with its verdict."""
+    """Return the result for a fit with its verdict."""
     s = record.s
     e = record.e
     density = count_samples_per_period(
         s, attempt.scaled
-    )  # This number is computed first, because its computation needs as much memory as all later steps.
+    )  # This number is computed first, because it needs as much memory as all later steps.
     remainder = e - attempt.energy
     rms = float(np.sqrt(np.mean(remainder**2)))
     spread = float(np.std(e))
@@ -358,7 +358,7 @@ def _judge_attempt(
     vibration = float(
         np.hypot.reduce(local) / np.sqrt(s.size)
     )  # The norm avoids an overflow of squares.
-    # If noise exceeds the vibration, a misfit does not prove a further mode.
+    # If noise exceeds the vibration, a misfit does not prove that there is a further mode.
     np.maximum(local, max(rms, SOLVER_FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))
     loose = _explain_misfit(rms / spread, structure / spread, local_structure)
@@ -406,12 +406,12 @@ def _explain_misfit(
 
 
 def count_samples_per_period(time: Samples, mode: Mode) -> float:
-    """Return the number of samples per energy period of the fastest mode, with four digits.
+    """Return the number of samples per energy period of the highest-frequency mode, with four digits.
 
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # Each interval is weighted by its length, so that gaps count more.
+    # Each interval is weighted by its length, so that gaps have more effect.
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
@@ -419,7 +419,7 @@ def count_samples_per_period(time: Samples, mode: Mode) -> float:
 def _explain_implausible(
     mode: Mode, density: float, least_periods: float, span: float
 ) -> str | None:
-    """Return the reason why a good fit does not show a single free vibration; None if it does."""
+    """Return the reason why a good fit does not show a single free vibration; None if it shows one."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         finding = f"the record shows {periods:.3g} vibration periods"
@@ -431,7 +431,7 @@ def _explain_implausible(
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
-        # The interval is 10 % finer than the limit, so that it suffices even if rounded to two digits.
+        # The interval is 10 % shorter than the limit, so that it suffices even after rounding to two digits.
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
         finding = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{finding}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
@@ -445,7 +445,7 @@ def _make_mode(parameters: Samples, origin: float) -> Mode:
 
 
 def _refuse_without_fit(time: Samples, reason: str) -> Identification:
-    """Return the result that rejects a record to which nothing was fitted."""
+    """Return the result that refuses a record to which nothing was fitted."""
     start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
     return Identification(
         None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))

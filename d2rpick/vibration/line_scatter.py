@@ -1,4 +1,4 @@
-"""Compute the uncertainty of residuals that follow from spectral lines fitted to a noisy record.
+"""Compute the uncertainty of residuals that are derived from spectral lines fitted to a noisy record.
 
 The lines are the least-squares fit of a sum of decaying waves, so the scatter of the record about them gives the
 covariance of their weights and poles, and the gradient of R^2 by these gives the standard deviation of R^2.
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
 _MOST_SHARED: Final = 0.9
-# Assumed standard deviation of the rate of a line before the fit, in cycles over the record.
-# This assumption limits the uncertainty of lines that the fit made from noise.
+# Assumed standard deviation of the frequency of a line before the fit, in cycles over the record [-].
+# The assumption before the fit limits the uncertainty of spurious lines that are fitted to noise.
 _LOOSE_TURNS: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of R^2 for one interpretation (``reading``) of the spectral lines of the energy on a ``grid``.
+    """Standard deviation of R^2 (R: residual) for one interpretation ``reading`` of the spectral lines on a ``grid``.
 
     Neighbouring states have the share ``systematic`` of the misfit in common [-].
     """
@@ -37,7 +37,7 @@ class LineScatter:
     systematic: float
 
     def compute_deviation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the standard deviation of R^2 of pairs of broadcastable times [-]."""
+        """Return the standard deviation of R^2 for pairs of broadcastable times [-]."""
         tr, td = np.broadcast_arrays(
             np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64)
         )
@@ -55,13 +55,13 @@ class LineScatter:
         design = np.hstack([_differentiate_waves(waves, times), mean.waves(times).real])
         freedom = max(times.size - design.shape[1], 1)
         shared = min(self.systematic, _MOST_SHARED)
-        # The number of independent states follows from a first-order autoregression.
+        # The number of independent states follows from a first-order autoregressive model.
         variance = np.sum(spectrum.rest**2) / freedom * (1 + shared) / (1 - shared)
         if variance <= 0:
             return np.zeros((design.shape[1], 1))
         loose = self._list_loose_scatters()
         scaled = design * loose / np.sqrt(variance)
-        # The inverse variances of the fit and of the prior assumption are added.
+        # The inverse variances of the fit and of the assumption before the fit are added.
         information, directions = np.linalg.eigh(scaled.T @ scaled)
         roots = directions / np.sqrt(1 + np.maximum(information, 0.0))
         return np.asarray(roots * loose[:, np.newaxis])
@@ -77,7 +77,7 @@ class LineScatter:
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
     def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
-        """Return the waves with weights that give their means over the blocks of the grid."""
+        """Return the waves, weighted such that they give the means over the blocks of the grid."""
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
@@ -122,7 +122,7 @@ def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
 
 
 def _differentiate_level(waves: Exponentials, times: Samples) -> Samples:
-    """Return the derivatives of H, the sum of twice the size of each decaying wave, shape (n, 4 k)."""
+    """Return the derivatives of H, twice the sum of the sizes of the decaying waves, shape (n, 4 k)."""
     return _differentiate_coherence(waves, times, times)
 
 

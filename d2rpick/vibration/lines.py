@@ -26,38 +26,38 @@ if TYPE_CHECKING:
 
 # Numbers of exponentials that are tried; each spectral line needs two, and the mean needs at least one.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# _CLEARLY_BETTER: more exponentials must reduce the prediction error to less than this share of it [-].
-# _PERFECT: with a smaller relative prediction error, more exponentials are not tried [-].
+# _CLEARLY_BETTER: largest ratio of prediction errors at which more exponentials are preferred [-].
+# _PERFECT: relative prediction error below which no more exponentials are tried [-].
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
-# _BETTER: replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
-# _OF_A_LINE: the misfit contains a line if its largest power exceeds the mean power by this factor [-].
+# _BETTER: limit that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
+# _OF_A_LINE: smallest ratio of the largest power to the mean power of a misfit that contains a spectral line [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
-# Share of the record that is fitted to predict the rest of the record [-].
+# Fraction of the record that is fitted to predict the rest of the record [-].
 FIRST_PART: Final = 0.7
 # Longest window of the signal subspace [states]; the computing time grows with the square of the length.
 _MOST_LAGS: Final = 340
-# _STATES_PER_PERIOD: number of states in the uniform grid per period of the fastest relevant line.
+# _STATES_PER_PERIOD: number of states of the uniform grid per period of the highest-frequency relevant line.
 # _FEWEST_STATES: smallest number of states in the uniform grid.
 # _MOST_STATES: largest number of states in the uniform grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
-# Times are treated as evenly spaced if they deviate by less than this share of an interval [-].
+# Largest deviation of evenly spaced times, as a fraction of an interval [-].
 _EVEN: Final = 1e-3
-# A line exceeds white noise if its power is more than this many times the median power.
+# Smallest ratio of the power of a line to the median power at which the line exceeds white noise [-].
 _ABOVE_NOISE: Final = 20.0
-# _ALL_POWER: the slowest lines that together have this share of the power are relevant [-].
-# _STRONG_POWER: the slowest lines that together have this share of the power are strong [-].
+# _ALL_POWER: fraction of the power of the lowest-frequency lines that are together treated as relevant [-].
+# _STRONG_POWER: fraction of the power of the lowest-frequency lines that are together treated as strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
-# The search for early decaying lines uses this first part of the record, given as a share of the record [-].
+# Length of the first part of the record that is searched for early decaying lines, as a fraction of the record [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
-# _SURE_TURNS: number of cycles above which a line is not confused with slow changes of the mean.
-# _MOST_DAMPED: largest damping of a line, as a share of its angular frequency [-].
+# _SURE_TURNS: number of cycles above which a line cannot be confused with slow changes of the mean.
+# _MOST_DAMPED: largest damping of a line, as a fraction of its angular frequency [-].
 # _MOST_DECAY: largest exponent with which a line decays within the record [-].
 _LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
-# Largest exponent with which a vibration seems to grow over the record because of noise [-].
+# Largest exponent with which noise makes a vibration seem to grow over the record [-].
 _MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference between the decay exponents of two exponentials over the record [-].
+# _SAME_DECAY: smallest difference, over the record, between the exponents of two decaying exponentials [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
@@ -76,12 +76,12 @@ class Grid(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Return the distance between two blocks [time]."""
+        """Return the distance between two successive blocks [time]."""
         return self.spacing * self.size
 
     @property
     def span(self) -> float:
-        """Return the time from the first block to the last [time]."""
+        """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
     def first(self, count: int) -> Grid:
@@ -103,7 +103,7 @@ class Grid(NamedTuple):
         return products.reshape(-1, poles.size)[:count]
 
     def gain(self, poles: Complex) -> Complex:
-        """Return the mean of ``exp(p t)`` over a block relative to its middle value, with the shape of ``poles``."""
+        """Return the mean of ``exp(p t)`` over a block relative to its middle value, in the shape of ``poles`` [-]."""
         half = poles * self.spacing / 2
         with np.errstate(invalid="ignore", divide="ignore"):
             gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
@@ -148,11 +148,11 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return how many cycles the fastest relevant and the fastest strong line have within equidistant times (n,)."""
+    """Return the numbers of cycles of the highest relevant and of the highest strong frequency in times (n,)."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # White noise has the same power at all rates, so the highest rates show its level.
+    # White noise has the same power at all frequencies, so the highest frequencies show the noise level.
     noise = _ABOVE_NOISE * float(compute_median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(
@@ -292,32 +292,32 @@ def predict(grid: Grid) -> Prediction | None:
 
 
 def _get_needed(spectrum: Spectrum) -> float:
-    """Return the factor by which a higher order must reduce the prediction error of a spectrum [-]."""
+    """Return the factor by which more exponentials must reduce the prediction error of a spectrum [-]."""
     powers = np.abs(np.fft.rfft(spectrum.rest)) ** 2
     typical = float(np.mean(powers))
     return _BETTER if powers.max() > _OF_A_LINE * typical else _CLEARLY_BETTER
 
 
 class _SignalSpace:
-    """The signal subspace, which is spanned by the windows of a record, with directions in descending order of size."""
+    """The signal subspace, spanned by the windows of a record, with its directions in descending order of size."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
 
     @classmethod
     def of(cls, grid: Grid) -> _SignalSpace:
-        """Compute the signal space of a grid."""
+        """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
         windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property
     def size(self) -> int:
-        """Return the number of directions."""
+        """Return the number of directions of the subspace."""
         return int(self.vectors.shape[1])
 
     def poles(self, order: int) -> Complex:
-        """Return the poles of ``order`` exponentials [1/time], from the shift of the space by one state."""
+        """Return the poles of ``order`` exponentials [1/time], from the shift invariance of the subspace (ESPRIT)."""
         leading = self.vectors[:, :order]
         factors = np.linalg.eigvals(
             np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]

@@ -1,4 +1,4 @@
-"""Find lines with rate and phase locked to other lines, which are due to a static deformation or nonlinear springs."""
+"""Find lines locked to other lines in frequency and phase, due to a static deformation or nonlinear springs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 # _NOTABLE_PARTNER: smallest height of a line to which other lines are locked, relative to the strongest line [-].
 # ABOVE_SCATTER: smallest height of a relevant line, in standard deviations [-].
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# _SAME_RATE: two rates are treated as equal if they differ by less than this share of a cycle over the record [-].
-# _EXACT_RATE: two rates are treated as identical if their phases drift apart by less than this in the record [rad].
+# _SAME_RATE: largest difference of frequencies that are treated as equal, in cycles over the record [-].
+# _EXACT_RATE: largest phase drift over the record of frequencies that are treated as identical [rad].
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # _SAME_PHASE: largest phase error of a line that is locked because of a static deformation [rad].
 # _SAME_PHASE_OF_HARMONICS: largest phase error of a harmonic [rad].
@@ -28,12 +28,12 @@ _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 # _THIRD_ROOM: relative tolerance for the third harmonic [-].
 # _HIGHEST_SECOND: largest ratio h2 / h1 [-]; it is at most 0.35 in theory (elliptic cosine).
 _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
-# A slowly oscillating deformation has energy at these multiples of its rate, like the force in a pendulum.
+# Multiples of the frequency of a slowly oscillating deformation at which its energy has spectral lines [-].
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
-# Two line heights are treated as equal if the logarithm of their ratio is below this [-].
+# Largest logarithm of the ratio of two line heights that are treated as equal [-].
 _SAME_HEIGHT: Final = 0.1
-# _STRONGEST: the search for harmonics is limited to this number of the strongest lines.
-# _HARMONICS: orders of the harmonics of these lines that are identified.
+# _STRONGEST: number of the strongest lines to which the search for harmonics is limited.
+# _HARMONICS: orders of the harmonics that the search identifies.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
@@ -82,7 +82,7 @@ def find_stretches(
                 abs(_wrap(phase[own_line] - 2 * phase[line], 2 * np.pi))
                 < _SAME_PHASE + unsure
             ):
-                # In a fit, the error of a rate times the record length is sqrt(12) times the error of a phase.
+                # In a fit, the error of an angular frequency times the record length is sqrt(12) times that of a phase.
                 is_exact = bool(apart < _EXACT_RATE + np.sqrt(12) * unsure)
                 energy = float(size[line] ** 2 / (8 * size[own_line]))
                 stretches.append(StretchLine(line, own_line, energy, is_exact=is_exact))
@@ -134,7 +134,7 @@ def _find_side_lines(
 
 
 class ThirdHarmonic(NamedTuple):
-    """The third harmonic of a line whose second harmonic has a locked phase; all heights are those at mid-window.
+    """The third harmonic of a line whose second harmonic has a locked phase; all heights refer to mid-window.
 
     A stretch has a line and its second harmonic, and so has a spring that stiffens; a third harmonic has only the
     spring.  ``expected`` is its height for that spring, ``measured`` what the record has there in phase with the first
@@ -198,7 +198,7 @@ def measure_third_harmonic(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Return the relative size of phase-locked lines at 3 and more times the rate of a line [-].
+    """Return the relative height of phase-locked lines at 3 and more times the frequency of a line [-].
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
@@ -221,7 +221,7 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Return the relative size of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
+    """Return the relative height of the harmonics of a line beyond the second, up to the first unlocked one [-]."""
     total = 0.0
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))

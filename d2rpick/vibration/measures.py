@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Mode
 
-    # Measures of n times, as arrays of shape (n,) by name, with NaN for unknown values.
+    # Measures of n times, as arrays of shape (n,), keyed by name, with NaN for unknown values.
     Columns = Mapping[str, Samples]
-    # Function that returns the residual of each tr with its lower and upper bound [-].
-    # The function takes the residuals computed from the deformations, the times tr, and td.
+    # A function that returns the residual of each tr with its lower and upper bound [-].
+    # The arguments of this function are the residuals computed from the deformations, the times tr, and td.
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
-# Increase of the frozen-deformation error that ``timing_tolerance`` allows [-].
+# Largest increase of the frozen-deformation error within the timing tolerance [-].
 TOLERATED_GROWTH = 0.05
-# The part of R^2 that depends on the phases at td is this factor times the damping ratio [-]; theory allows up to 2.
+# Ratio of the part of R^2 that depends on the phases at td to the damping ratio [-]; in theory, it is at most 2.
 _PHASES_COUNT = 1.5
 
 
@@ -56,7 +56,7 @@ class Deformation(Protocol):
 
 
 class Measured(Record):
-    """Measures of one tr that require known deformations; each is None if it is unknown.
+    """Measures of one tr that require known deformations; each measure is None if it is unknown.
 
     ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
     """
@@ -92,7 +92,7 @@ def measured(
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Place columns of `Measured` at the given rows of a table with ``size`` rows; the other rows are NaN."""
+    """Place columns of `Measured` in the given rows of a table with ``size`` rows; the other rows are NaN."""
     # This array needs no memory, because it is broadcast from a single value.
     nothing = np.broadcast_to(np.nan, size)
     spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
@@ -103,12 +103,12 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 
 
 def compared(columns: Columns) -> NDArray[np.bool_]:
-    """Return for each time whether its deformation can be compared with the deformation at td."""
+    """Return a mask of the times whose deformation can be compared with the deformation at td."""
     return ~np.isnan(columns["sign_match"])
 
 
 def level_error(energy: Samples | float, level: Samples | float) -> Samples:
-    """Return |sqrt(E(tr)/E(td)) - 1| [-]: the relative amplitude error, in the shape of ``energy``.
+    """Return |sqrt(E(tr)/E(td)) - 1| [-], the relative amplitude error, in the shape of ``energy``.
 
     NaN where an energy, or the ``level`` at td, is not positive.
 
@@ -129,7 +129,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
 
 
 def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
-    """Return K = T(td)/V(td) [-]: the kinetic share of the vibration energy at td, which no tr preserves.
+    """Return K = T(td)/V(td) [-], the kinetic fraction of the vibration energy at td, which no tr preserves.
 
     Of the shape of ``td``.
 
@@ -141,7 +141,7 @@ def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
 def lock_in_error(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> Samples:
-    """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the locked-in deformation, in the shape of ``tr``.
+    """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-], the error of the locked-in deformation, in the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
     several modes the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
@@ -155,7 +155,7 @@ def lock_in_error(
 def sign_match(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> NDArray[np.bool_]:
-    """Return for each tr whether the deformations at tr and td have the same direction.
+    """Return True for each tr at which the deformation has the same direction as at td.
 
     For one mode: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a mode with almost no
     deformation does not decide.
@@ -166,7 +166,7 @@ def sign_match(
 def band_about(
     squared: Samples, off: Samples, hidden: Samples | float, left_out: Samples | float
 ) -> tuple[Samples, Samples, Samples]:
-    """Return a residual with its lower and upper bound, from its square and the error of the square.
+    """Return a residual with its lower and upper bound, from its square and the error of the square [-].
 
     The square may be ``off`` to either side, higher by what is ``hidden``, and lower by what is ``left_out`` [-].  No
     square is below zero: where it may reach there, the middle of what remains is stated.
@@ -178,7 +178,7 @@ def band_about(
 
 
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
-    """Return the share of R^2 that depends on the phase of the error at td [-].
+    """Return the fraction of R^2 that depends on the phase of the error at td [-].
 
     Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
     after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.
@@ -187,7 +187,7 @@ def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
 
 
 def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
-    """Return R = sqrt(L^2 + K) [-]: the vibration error after td relative to the reference vibration.
+    """Return R = sqrt(L^2 + K) [-], the vibration error after td relative to the reference vibration.
 
     Examples
     --------
@@ -198,7 +198,7 @@ def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
 
 
 def wrong_sign(kinetic: float) -> float:
-    """Return R = sqrt(4 - 3 K) [-]: the residual of the level of td with the opposite sign, L^2 = 4 (1 - K).
+    """Return R = sqrt(4 - 3 K) [-], the residual of the level of td with the opposite sign, L^2 = 4 (1 - K).
 
     Examples
     --------
@@ -234,7 +234,7 @@ def run_time_share(
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """Return by how much each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
+    """Return the time by which each tr (n,) may be wrong in either direction before L grows by 0.05 [time].
 
     The limit is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr
     by the tolerated growth; one period if q stays inside, since q has then passed all its values.
@@ -245,7 +245,7 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     )
     half = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # Times of zero velocity on both sides of tr, in columns. Between these times q is monotone.
+    # Columns of the times of zero velocity on both sides of tr. Between these times, q is monotone.
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
@@ -263,7 +263,7 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # This value lies outside of the band, on the side where q leaves it.
+    # This value lies outside the band, on the side where q leaves it.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
@@ -297,14 +297,14 @@ def vertices(
 
 
 class Profile(NamedTuple):
-    """Frozen-deformation errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
+    """Frozen-deformation errors ``error`` [-] at ascending times ``time`` [time], both of shape (n,), for one td."""
 
     time: Samples
     error: Samples
 
     @classmethod
     def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
-        """Compute the profile at the times before ``td``."""
+        """Compute the error profile at the times before ``td``."""
         time_before = time[
             : np.searchsorted(time, td)
         ]  # The arrays are views, because a copy for each td would fill the memory.
@@ -323,7 +323,7 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Return the interval between the samples around ``at`` [time]; infinite if there are fewer than two."""
+        """Return the interval between the samples around ``at`` [time]; infinity if there are fewer than two."""
         if self.time.size < 2:
             return np.full(np.shape(at), np.inf)
         next_state = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
@@ -355,11 +355,11 @@ class Profile(NamedTuple):
     def _leaving(
         self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples
     ) -> Samples:
-        """Return the distance from each ``tr`` to where the error exceeds ``limit``, by linear interpolation."""
+        """Return the distance from each ``tr`` to where the error exceeds ``limit`` [time], by linear interpolation."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
         (t0, e0), (t1, e1) = (
             (self.time[at], self.error[at]) for at in (inside, outside)
         )
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # If there is no sample between tr and the first sample outside, that sample is used.
+        # If there is no sample between tr and the first sample outside, the sample outside is used.
         return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

@@ -1,4 +1,4 @@
-r"""Compute the error of any pair of times, for any number of modes, from the energy at tr, td and halfway between them.
+r"""Compute the error of any pair of times, for any number of modes, from the energy at tr, td and midway between them.
 
 A linear structure in free flight has modes :math:`q_k = a_k e^{-g_k t} \cos(w_k t + p_k)`, scaled so that the elastic
 energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr and td and :math:`\tau` from tr to td,
@@ -41,7 +41,7 @@ class Reading:
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
     record beside the spectrum that is kept, at ``times`` [energy], [time].
 
-    ``hidden_pairs`` is the energy of pairs of modes with equal rates and opposite phases, whose lines cancel each
+    ``hidden_pairs`` is the energy of pairs of modes with equal frequencies and opposite phases, whose lines cancel each
     other, over the energy that the lines show [-].
     """
 
@@ -64,7 +64,7 @@ class Reading:
         return 2 * (1 + self.hidden_pairs) * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, the elastic energy of the vibration, in the shape of ``t``; noise may make it negative [energy]."""
+        """Return V, the elastic energy of the vibration [energy], in the shape of ``t``; noise may make it negative."""
         t = np.asarray(t, dtype=np.float64)
         energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
         if self.no_static:
@@ -76,7 +76,7 @@ class Reading:
         return np.asarray(energy + self.level_of_modes(t) / 2)
 
     def level_of_modes(self, t: Samples | float) -> Samples:
-        """Return the sum of the mode energies according to their lines, with the shape of ``t`` [energy]."""
+        """Return the sum of the mode energies according to their lines, in the shape of ``t`` [energy]."""
         decays = self.modes._replace(
             poles=self.modes.poles.real.astype(np.complex128),
             weights=self._peak_energies.astype(np.complex128),
@@ -84,7 +84,7 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """Return the peak energy H of all modes, averaged over a period, with the shape of ``t`` [energy]."""
+        """Return the peak energy H of all modes, averaged over a period, in the shape of ``t`` [energy]."""
         if self.no_static:
             level = 2 * self.spectrum.mean.at(t)
         else:
@@ -92,7 +92,7 @@ class Reading:
         return np.maximum(level, self.tiny)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, the elastic and kinetic energy of the vibration, with the shape of ``t`` [energy]."""
+        """Return U = V + T, the elastic and kinetic energy of the vibration, in the shape of ``t`` [energy]."""
         return np.maximum(self.level(t) + self._within_period.at(t), self.tiny)
 
     @cached_property
@@ -119,12 +119,12 @@ class Reading:
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """Return the factor in the coherence that depends on tr; the last axis counts the modes [energy]."""
+        """Return the factor in the coherence that depends on tr [energy]; the last axis counts the modes."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """Return the factor in the coherence that depends on td; the last axis counts the modes [-]."""
+        """Return the factor in the coherence that depends on td [-]; the last axis counts the modes."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -133,7 +133,7 @@ class Reading:
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, not limited to its bounds, which noise or a wrong model may make it exceed [energy]."""
+        """Return X without limiting it to its bounds, which noise or a wrong model may make it exceed [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)

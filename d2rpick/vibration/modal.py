@@ -46,80 +46,80 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Spectral lines are identified only in records with at least this number of states.
+# Smallest number of states of a record in which spectral lines are identified.
 _FEWEST_STATES: Final = 32
-# A static energy below this share of the mean vibration energy may be a fitting error [-].
+# Largest static energy that may be a fitting error, as a fraction of the mean vibration energy [-].
 _NO_STATIC: Final = 0.12
-# There is no vibration if the relative range of the energy is below this [-], which single precision cannot resolve.
+# Smallest relative energy range of a vibration [-]; single precision cannot resolve less.
 _RESOLVED: Final = 2e-7
-# Smallest number by which energies are divided, as a share of the energy range of the record [-].
+# Smallest number by which energies are divided, as a fraction of the energy range of the record [-].
 _TINY: Final = 1e-12
 # Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
 _CHECKED: Final = 90
 
-# It is unclear whether a line is due to a static deformation if the energies differ by less than this share [-].
+# Smallest relative difference of mean energy and half peak energy at which no line is ambiguous [-].
 _AMBIGUOUS: Final = 0.08
 
-# Largest prediction error, relative to the range of the energy, with which a record is not refused [-].
+# Largest prediction error of an accepted record, relative to the range of the energy [-].
 _MOST_MISSED: Final = 0.5
-# Largest misfit, relative to the range of the energy, with which a record is not refused [-].
+# Largest misfit of an accepted record, relative to the range of the energy [-].
 _MOST_MISFIT: Final = 0.3
 # _MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
 # _MOST_NEGATIVE_AT_ALL: limit that replaces _MOST_NEGATIVE if there is no better model [-].
 _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
-# Largest change of the static energy, relative to the mean vibration energy, with which a record is not refused [-].
+# Largest change of the static energy in an accepted record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
 # Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
 _MOST_BEYOND: Final = 0.12
-# Largest size of harmonics, relative to their fundamental line, with which a record is not refused [-].
+# Largest size of the harmonics in an accepted record, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest energy of a static deformation that the static energy lacks [-].
+# _MOST_UNSTRETCHED: largest deficit of static energy for a static deformation, per mean vibration energy [-].
 # _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
-# Smallest number of states per period of the fastest strong line with which a record is not refused.
+# Smallest number of states in an accepted record per period of the highest-frequency strong line.
 _FEWEST_PER_PERIOD: Final = 2.4
 
-# Number of times per period of the fastest relevant line at which deformations are evaluated.
+# Number of times per period of the highest-frequency relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Number of parts into which each interval between such times is divided for linear interpolation of the energy.
+# Number of parts of each interval between evaluated deformations, for linear interpolation of the energy.
 _FINER: Final = 4
 
-# _LITTLE_LEFT: largest misfit of modes that show a flight, relative to the energy range [-].
-# _LITTLE_MISSED: largest prediction error of modes that show a flight, relative to the energy range [-].
-# _EXACT: modes are exact if their errors are below this share of these limits [-].
-# _SLOW_TOO: modes that do not complete a cycle are distinguished from other slow changes below this share [-].
+# _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
+# _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
+# _EXACT: largest error of exact modes, as a fraction of these two limits [-].
+# _SLOW_TOO: largest error at which slow modes are distinguished from other slow changes, as such a fraction [-].
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
-# _NOT_LINEAR: relative error of a deformation because real structures are not linear [-].
+# _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
 # For a shell box, R deviated by 0.015 to 0.018 (rms) from the R of all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
-# If the half-width of the error band of R^2 exceeds this, the modes are poorly identified [-].
+# Half-width of the error band of R^2 above which the modes are poorly identified [-].
 _VAGUE_HALF: Final = 0.2
 # Number of times at which the error band is evaluated.
 _SOME_TIMES: Final = 64
 # Half-width of the error band of R^2 in standard deviations, as for a single oscillator.
 _DEVIATIONS: Final = 2.5
-# Effect on R^2 of the part of the energy that the lines do not explain, as a factor on its share of the energy [-].
-# R^2 contains the energy at tr once and the energy halfway twice; 1.6 is a 90 % quantile of the normal distribution.
+# Effect on R^2 of the energy that the lines do not explain, as a factor on its fraction of the energy [-].
+# Noise in the energies at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 deviations bound 90 %.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
-# A correlation of neighbouring misfits is treated as noise if it is below this many standard errors.
+# Largest correlation of neighbouring misfits that is treated as noise, in standard errors [-].
 _CHANCE: Final = 2.0
 # _DRIFT_COUNTS: effect on R^2 of a mean energy that changes in the flight, as a factor on the change [-].
 # _NEGATIVE_COUNTS: effect on R^2 of a negative or too small static energy, as a factor on its relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
 # _BENT_ALIKE: effect on R^2 of the second harmonic of a stiffening spring, if both deformations are equal [-].
-# _BENT_ACROSS: additional effect on R^2 of this harmonic, if the deformations are orthogonal [-].
+# _BENT_ACROSS: additional effect on R^2 of the second harmonic, if the deformations are orthogonal [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
-# Largest R^2 that is possible, which is that of equal and opposite deformations [-].
+# Largest possible R^2, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
 
 
 class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
+    """Indications that a record is not that of a linear structure in free flight; 0 means that there is no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -142,11 +142,11 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if no better model exists; None if it is accepted then."""
+        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason why the record is refused under the given limits."""
+        """Return the first reason why the record is refused under the given limits; None if there is no reason."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,
@@ -179,7 +179,7 @@ class Doubts(NamedTuple):
 
 
 class ModeAtTd(NamedTuple):
-    """A mode of the structure: damped rate and damping [1/time], and vibration energy at td [energy]."""
+    """A mode of the structure: damped angular frequency and damping [1/time], and vibration energy at td [energy]."""
 
     omega: float
     alpha: float
@@ -187,7 +187,7 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies at times so close that linear interpolation is accurate enough [time], [energy]."""
+    """Elastic energies [energy] at times so close that linear interpolation is accurate enough [time]."""
 
     time: Samples
     energy: Samples
@@ -212,7 +212,7 @@ class ModalVibration:
     noise : float
         Scatter of the record about its lines [energy].
     systematic : float
-        Share of the scatter that neighbouring states share, and which is believed [-].
+        Fraction of the scatter that neighbouring states share, and which is believed [-].
     states_per_period : float
         States of the record in a period of the fastest line that is told from noise [-].
     scatter : LineScatter
@@ -255,7 +255,7 @@ class ModalVibration:
         ) is None
 
     def as_last_resort(self) -> ModalVibration:
-        """Return the vibration with wider limits of doubt, for use if no better model exists."""
+        """Return the vibration with wider limits for refusal, for use if no better model exists."""
         return replace(self, last_resort=True)
 
     @property
@@ -269,14 +269,14 @@ class ModalVibration:
         return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
-        """Return True if the error of the modes, apart from white noise, is below a share of the acceptable error."""
+        """Return True if the error of the modes, apart from white noise, is below ``share`` of the acceptable error."""
         doubts = self.doubts
         follows = _predicts_within(share, doubts.missed, doubts.misfit, self.systematic)
         return self.signed and follows
 
     @property
     def told(self) -> str:
-        """Describe the modes and their rates, on which a choice is based."""
+        """Describe the modes on which a choice is based, with their frequencies."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         if rates.size == 1:
@@ -286,14 +286,14 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
-        """Return the modes with their energies at ``td``, the slowest mode first."""
+        """Return the modes with their energies at ``td``, with the lowest frequency first."""
         poles = self.reading.modes.poles
         energies = self.reading.energies_of_modes(td)
         rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
         return sorted(ModeAtTd(*map(float, row)) for row in rows)
 
     def comparable_since(self, td: float) -> float:
-        """Return the earliest time whose deformation can be compared with that at ``td`` [time]."""
+        """Return the earliest time at which the deformation can be compared with that at ``td`` [time]."""
         return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
@@ -305,15 +305,15 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, not negative, with the shape of ``t`` [energy]."""
+        """Return V, not negative, in the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Return U = V + T, with the shape of ``t`` [energy]."""
+        """Return U = V + T, in the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, not negative, with the shape of ``t`` [energy]."""
+        """Return T, not negative, in the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -328,7 +328,7 @@ class ModalVibration:
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
-        """Return frozen-deformation errors at each ``time`` before ``td``, from values computed once for all td."""
+        """Return frozen-deformation errors at each ``time`` before ``td`` [-], from values computed once for all td."""
         last = int(np.searchsorted(self.time, td))
         elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2
@@ -348,7 +348,7 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Return elastic energies at ``time`` and at finer times, and the factor of tr in the coherence."""
+        """Return elastic energies at ``time`` and at finer times, and the part of the coherence that depends on tr."""
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
@@ -360,7 +360,7 @@ class ModalVibration:
         )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return half of the width of the band of R^2 for pairs of times [-]."""
+        """Return half of the width of the error band of R^2 for pairs of times [-]."""
         off, below, above = self._compute_errors(tr, td)
         return np.asarray(off + (below + above) / 2)
 
@@ -386,7 +386,7 @@ class ModalVibration:
         of_structure = _compute_effect_of_deformation(_NOT_LINEAR, squared)
         off = np.asarray(
             _LEAST_HALF
-            # The following errors are independent of each other.
+            # The errors of lines, misfit and structure are independent of each other.
             + np.sqrt(of_lines**2 + of_rest**2 + of_structure**2)
             + min(self._wrong, 1.0) * (1 + np.abs(squared - 1))
             + self._phase_share * squared
@@ -408,7 +408,7 @@ class ModalVibration:
 
     @property
     def _structure_of_rest(self) -> float:
-        """Return the share of the misfit that neighbouring states have in common, beyond what chance explains [-]."""
+        """Return the fraction of the misfit that neighbouring states have in common, beyond chance [-]."""
         chance = _CHANCE / np.sqrt(self.reading.spectrum.rest.size)
         return max(self.systematic - float(chance), 0.0)
 
@@ -432,7 +432,7 @@ class ModalVibration:
         return measures.band_about(np.square(stated), off, above, below)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the share of the vibration energy at td that a hidden mode needs to explain the band, for each tr [-].
+        """Return the fraction of vibration energy at td that a hidden mode needs to explain the band for each tr [-].
 
         A hidden mode in opposite phase at tr and td adds four times its share to R^2.
         """
@@ -448,7 +448,7 @@ class ModalVibration:
 
     @cached_property
     def _phase_share(self) -> float:
-        """Return the share of R^2 that depends on the phases of all modes at td [-]."""
+        """Return the fraction of R^2 that depends on the phases of all modes at td [-]."""
         modes = self.reading.modes
         poles = modes.poles
         sizes = np.abs(modes.weights)
@@ -457,7 +457,7 @@ class ModalVibration:
 
     @cached_property
     def _wrong(self) -> float:
-        """Return the error that widens the band of all pairs equally [-]."""
+        """Return the error that widens the error band of all pairs equally [-]."""
         doubts = self.doubts
         if self.reading.no_static:
             return doubts.harmonic  # The alternative interpretation already accounts for the error of the mean.
@@ -500,14 +500,14 @@ class ModalVibration:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Return True if lines at half the rate of others may be due to a static deformation or to modes."""
+        """Return True if lines at half the frequency of others may be due to a static deformation or to modes."""
         return not self.reading.is_mode.all() and bool(self.others)
 
 
 def identify_modal(
     time: Samples, energy: Samples, *, kinetic: bool = False
 ) -> ModalVibration | None:
-    """Identify the modes of a structure from its energy in free flight; None if the energy has no lines.
+    """Identify the modes of a structure from its energy in free flight; None if the energy has no spectral lines.
 
     The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in the kinetic
     energy changes slowly: the sum of elastic and kinetic energy of a mode falls monotonically.
@@ -570,7 +570,7 @@ def confirm_by_kinetic_energy(
 
 
 def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
-    """Return True if the kinetic energy may be used, since plastic flow or a damper makes the internal energy useless.
+    """Return True if the kinetic energy may be used because plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
     Plastic flow and dampers add to it.  If the static energy falls instead, a deformation relaxes, which moves the
@@ -590,7 +590,7 @@ def _predicts_within(
 ) -> bool:
     """Return True if the error of lines, apart from white noise, is below a ``share`` of the acceptable error.
 
-    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states have the share ``systematic`` of the misfit in common.
+    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
     """
     white = 1 - systematic
     structure = misfit * np.sqrt(systematic)
@@ -600,7 +600,7 @@ def _predicts_within(
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
-    """Return the correlation between the misfits of neighbouring states, at least 0; white noise gives 0 [-]."""
+    """Return the correlation between the misfits of neighbouring states, at least 0; it is 0 for white noise [-]."""
     products = np.sum(remainder[1:] * remainder[:-1])
     power = max(float(np.sum(remainder**2)), 1e-300)
     return float(np.clip(products / power, 0.0, 1.0))
@@ -735,7 +735,7 @@ def _compute_sine(squared: Samples) -> Samples:
 
 
 def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
-    """Count the states per period of the fastest relevant line that is stronger than noise."""
+    """Return the number of states per period of the highest-frequency relevant line that is stronger than noise."""
     sizes = np.abs(lines.weights)
     least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
     fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
@@ -750,7 +750,7 @@ def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
-    """Return times in a window, so close that a parabola through three of them locates a minimum [time]."""
+    """Return times in a window so close that a parabola through three of them locates a minimum [time]."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]

@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
 
-# Windows begin and end at multiples of 1/16 of the record.
+# Number of equal parts of the record whose boundaries are the possible ends of windows.
 _PARTS: Final = 16
-# Windows that reach the end of the record begin at these shares of it.
+# Beginnings of windows that reach the end of the record, as fractions of the record [-].
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window, the record follows the modes as long as means over a part of the fastest period deviate little.
-# _MEANS_PER_PERIOD: number of energy means that are checked in each period of the fastest mode.
-# _MOST_OFF: largest deviation of an energy mean from the modes, as a share of the vibration energy [-].
-# _SCATTERS_OFF: largest deviation of an energy mean from the modes, in standard deviations of such means.
+# Outside its window, a record follows the modes if its mean energies over part of the shortest period deviate little.
+# _MEANS_PER_PERIOD: number of mean energies that are checked in each period of the highest-frequency mode.
+# _MOST_OFF: largest deviation of the mean energy from the modes' prediction, relative to the vibration energy [-].
+# _SCATTERS_OFF: largest deviation of the mean energy from that predicted by the modes, in standard errors [-].
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
-# Largest number of times that a window is extended and identified again.
+# Largest number of times that a window is extended and its modes are identified again.
 _MOST_REFITS: Final = 3
 
 
 class ModalWindow(NamedTuple):
-    """A ``vibration`` that describes the record in a ``span``."""
+    """A ``vibration`` that describes the record in a time ``span``."""
 
     vibration: ModalVibration
     span: Span
@@ -40,7 +40,7 @@ class ModalWindow(NamedTuple):
 def find_described(
     history: History, td: float, guess: Span | None
 ) -> ModalWindow | None:
-    """Find a window around td in which modes continue undisturbed; None if none is found.
+    """Find a window around td in which modes continue undisturbed; None if there is none.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def find_described(
 
 @remember
 def _grow_described(history: History, window: Span) -> ModalWindow | None:
-    """Extend a window if its modes continue undisturbed outside of it; else return None.
+    """Extend a window if its modes continue undisturbed outside it; otherwise return None.
 
     The result depends on the window alone, not on the td that was asked for first.
     """
@@ -153,7 +153,7 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Count the states up to the last that deviates from the modes; all of them precede the window."""
+    """Return the number of states up to the last one that deviates from the modes; all of them precede the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(

@@ -43,21 +43,23 @@ if TYPE_CHECKING:
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.span import Span
 
+# A time without states is a gap if it is this many times as long as the usual output interval [-].
+_GAP: Final = 10.0
 # Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# Residual of a run that does not vibrate after td [-]; a pair with a larger residual preserves nothing.
+# Residual of a run without vibration after td [-]; a pair with a larger residual preserves nothing.
 NOTHING_KEPT: Final = 1.0
-# A tr in this last share of the time before td saves little time [-], although its deformation is similar.
+# Last part of the time before td in which a tr saves little time, as a fraction of this time [-].
 NEAR_TD: Final = 0.25
-# _OF_INTERVAL: largest distance of a match from the true minimum of the error, in intervals of the profile [-].
-# _OF_INTERVAL_BY_MODES: this distance if modes describe the energy between the states too [-].
-# For modes, 93 % of 2200 matches were within 1/8 interval; the error of the other matches hardly changed.
+# _OF_INTERVAL: largest distance of a closest match from the true minimum of the error, in sampling intervals [-].
+# _OF_INTERVAL_BY_MODES: the same limit as _OF_INTERVAL for modes, which describe the energy between the states [-].
+# For modes, 93 % of 2200 closest matches were within 1/8 interval; the error of the others hardly changed.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 
 
 class Compared(NamedTuple):
-    """Deformations that can be compared with those at td, from ``first`` to ``last`` [time].
+    """Deformations at the times from ``first`` to ``last`` [time], which can be compared with the deformation at td.
 
     ``profile`` returns their frozen-deformation error before a td; it is None if there is only one mode, which has a
     closed form. ``band`` is that of a residual.
@@ -72,7 +74,7 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Vibration:
-    """The vibration as the best reliable model describes it for one td.
+    """The vibration for one td, as described by the best reliable model.
 
     Parameters
     ----------
@@ -108,7 +110,7 @@ class Vibration:
 
     @property
     def modal(self) -> ModalVibration | None:
-        """Return the modes of the structure that are used; None if none are used."""
+        """Return the modes of the structure that are used; None if no modes are used."""
         if self.basis == "modal" and self.compared:
             return cast("ModalVibration", self.compared.deformation)
         return None
@@ -129,7 +131,7 @@ class Vibration:
 
     @cached_property
     def least_residual(self) -> float | None:
-        """Return the smallest residual of all tr that save much [-]; None unless there are many modes."""
+        """Return the smallest residual of all tr that save much time [-]; None unless there are many modes."""
         if self.basis != "modal" or self.profile is None or self.compared is None:
             return None
         last = self.td - NEAR_TD * (self.td - self.compared.first)
@@ -140,12 +142,12 @@ class Vibration:
 
     @property
     def keeps_nothing(self) -> bool:
-        """Return True if no tr that saves much is better than a release without vibration."""
+        """Return True if no tr that saves much time is better than a release without vibration."""
         return self.least_residual is not None and self.least_residual > NOTHING_KEPT
 
     @property
     def most_lock_in(self) -> float | None:
-        """Return the largest useful frozen-deformation error of a tr [-], for many modes; otherwise None."""
+        """Return the largest useful frozen-deformation error of a tr for many modes [-]; otherwise None."""
         if self.basis != "modal":
             return None
         least_residual = self.least_residual or 0.0
@@ -203,7 +205,7 @@ class Vibration:
         return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors to which the tolerance applies, in the shape of ``times``; infinite if no tr is useful [-].
+        """Return the errors to which the tolerance applies [-], in the shape of ``times``; infinity if no tr is useful.
 
         The frozen-deformation error if signs are known (for a few modes only if they match), else the level error.
         """
@@ -225,7 +227,7 @@ class Vibration:
         return np.append(self.whole.edges(), self.profile.time if self.profile else ())
 
     def reach(self, moments: Moments) -> Samples:
-        """Return the uncertainty of each moment [time]; for a match, a share of an interval of the profile.
+        """Return the uncertainty of each moment [time]; for a closest match, it is a fraction of a profile interval.
 
         A match lies at a minimum of the error: in the same interval if only states are known, and much nearer to the
         vertex of a parabola if the error between them is known.
@@ -239,7 +241,7 @@ class Vibration:
         )
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
-        """Return for each time whether its deformation can be compared with the deformation at td."""
+        """Return a mask of the times at which the deformation can be compared with the deformation at td."""
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
@@ -326,7 +328,7 @@ def measure_all(
 
 
 def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
-    """Yield index groups of vibrations with the same mode and window, and single indices of all others."""
+    """Yield groups of indices of vibrations with the same mode and window, and single indices of all others."""
     groups: dict[object, list[int]] = {}
     for position, vibration in enumerate(vibrations):
         whole = vibration.whole
@@ -373,13 +375,13 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the states per period of the fastest line of the energy [-]; None if lines were not identified."""
+        """Return the states per period of the highest-frequency line [-]; None if no lines were identified."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def states_per_strong_period(self) -> float | None:
-        """Return the states per period of the fastest strong line [-]; None if lines were not identified."""
+        """Return the states per period of the highest-frequency strong line [-]; None if no lines were identified."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 
@@ -398,7 +400,7 @@ class Evidence(NamedTuple):
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Return the best reliable model; ``whole`` is the oscillator or, if there is none, the samples of the energy."""
+    """Return the best reliable model; ``whole`` is the oscillator or, if there is none, the energy samples."""
     if not evidence.signed:
         return whole
     basis = evidence.signed
@@ -409,7 +411,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
-    # If neighbouring misfits are correlated there is a further mode, which the modal model describes better.
+    # If neighbouring misfits are correlated, there is a further mode, which the modal model describes better.
     # If the misfits are white noise, they do not show a further mode.
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
@@ -440,7 +442,7 @@ def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vib
 
 
 def is_doubtful(whole: Vibration) -> bool:
-    """Return True if no oscillator is known, or its misfit is so large that its sign may be wrong."""
+    """Return True if no oscillator is known, or if its misfit is so large that its sign may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
         or whole.whole.fit.hidden_share > SMALLEST
@@ -448,7 +450,7 @@ def is_doubtful(whole: Vibration) -> bool:
 
 
 def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Return the reliable model of the total energy at ``td``: an oscillator, else the samples."""
+    """Return the reliable model of the total energy at ``td``: an oscillator, or else the samples."""
     fit = evidence.fit
     whole = describe_energy_at(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
@@ -462,7 +464,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
-        # Fitting lines needs fewer states than determining a level, and the fit refuses records with too few.
+        # Fitting lines needs fewer states than determining a level, and the fit refuses records with too few states.
         aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
@@ -489,7 +491,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
 def describe_energy_at(
     history: History, td: float, evidence: Evidence
 ) -> SampledEnergy:
-    """Return the best description of the energy, even if it is unreliable at ``td``: an oscillator, else samples."""
+    """Return the best description of the energy, even if unreliable at ``td``: an oscillator, or else the samples."""
     fit = evidence.fit
     span = evidence.span
     if fit and fit.mode and span:
@@ -506,6 +508,15 @@ def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
     text = f"the energy has {states:.3g} states per period"
-    return (
-        f"{text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-    )
+    needed = f"at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies"
+    return (f"{text}{_describe_gap(time)}, {needed}",)
+
+
+def _describe_gap(time: Samples) -> str:
+    """Return the longest interval without states as text, if it is much longer than the others."""
+    steps = np.diff(time)
+    longest = int(np.argmax(steps))
+    if steps[longest] <= _GAP * float(np.median(steps)):
+        return ""
+    start, end = time[longest : longest + 2]
+    return f" (no states from {start:.6g} to {end:.6g})"

@@ -23,9 +23,9 @@ BLOCK: Final = 8192
 # Largest number of steps of the root search, with which bisection alone reaches full precision.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
-# Energies below this share of the highest energy may be solver errors, which are typically 1/10 of this.
+# Energy below which values may be solver errors, as a fraction of the highest energy; typical errors are 1/10 of it.
 SOLVER_FLOOR: Final = 1e-4
-# A deformation below this share of the amplitude is treated as zero.
+# Largest deformation that is treated as zero, as a fraction of the amplitude [-].
 _ZERO = 1e-9
 
 
@@ -80,7 +80,7 @@ class Mode(SignedAmplitudes):
 
     @property
     def omega_0(self) -> float:
-        """Return the undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
+        """Return the undamped angular frequency, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
         return float(np.hypot(self.omega, self.alpha / 2))
 
     def deformation(self, t: Samples | float) -> Samples:
@@ -92,11 +92,11 @@ class Mode(SignedAmplitudes):
         return self._swing(t, *self._velocity_parts)
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return the signed deformation, with the shape of ``t`` and a first axis of length one [sqrt(energy)]."""
+        """Return the signed deformation, in the shape of ``t`` with a first axis of length one [sqrt(energy)]."""
         return self.deformation(t)[np.newaxis]
 
     def energy(self, t: Samples | float) -> Samples:
-        """Return E(t), plastic and elastic [energy]."""
+        """Return E(t), the plastic and elastic energy [energy]."""
         return self.energy_plastic + self.deformation(t) ** 2
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
@@ -139,7 +139,7 @@ class Mode(SignedAmplitudes):
         return compute_energy_and_jacobian(own_gradient, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
-        """Find the first time after or at ``t`` with q' = 0; the next one is half a period later."""
+        """Return the first time at or after ``t`` with q' = 0 [time]; the next one is half a period later."""
         cosine, sine = self._velocity_parts
         # The velocity, cosine cos x + sine sin x, is 0 at x = phase + n pi.
         phase = np.arctan2(-cosine, sine)
@@ -148,7 +148,7 @@ class Mode(SignedAmplitudes):
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) with q' = 0, in ascending order [time]."""
-        if not start < end:  # For infinite times the phase would not be finite.
+        if not start < end:  # For infinite times, the phase would not be finite.
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# The sign of the deformation is uncertain if the misfit exceeds this share of the vibration energy at td [-].
+# Largest misfit at which the sign of the deformation is certain, as a fraction of the vibration energy at td [-].
 _DROWNED = 0.2
-# Times are treated as equal if their phases differ by less than this [rad].
+# Largest phase difference of times that are treated as equal [rad].
 _ZERO = 1e-9
 
 # "crossing": the energy crosses the target energy.
@@ -40,9 +40,9 @@ _ZERO = 1e-9
 # "start": the start of a flight in which nothing vibrates.
 # "given": the user gave the time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
-# Factor on the second differences of the energy, because E'' may be larger between the samples [-].
+# Safety factor on the second differences of the energy, because E'' may be larger between the samples [-].
 # With a factor of 1.25, the error bounds contain 99 % of the true crossings of random vibrations.
-# This was tested with at least 8 samples per period.
+# The safety factor was tested with at least 8 samples per period.
 _BEND_RESERVE = 1.25
 # Number of standard deviations in the error of a time; 3 cover 99.7 % of normal errors.
 _DEVIATIONS = 3.0
@@ -50,7 +50,7 @@ _DEVIATIONS = 3.0
 _ROUNDING_DEVIATIONS = 2.6
 # Ratio of the largest systematic misfit to its rms [-], which is that of a vibration.
 _PEAK_OF_REST = sqrt(2)
-# Safety margin for times between the samples, as a share of the output interval [-].
+# Safety margin for times between the samples, as a fraction of the output interval [-].
 _BETWEEN_SAMPLES = 1e-3
 
 
@@ -63,7 +63,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return the energy at a time, from the modes if they describe that time, else from the samples [energy]."""
+        """Return the energy at a time [energy], from the modes if they describe that time, else from the samples."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
@@ -96,7 +96,7 @@ class SampledEnergy:
         return near[near >= since]
 
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
-        """Return times and energies from the last sample before ``since`` up to td, and td itself with its level."""
+        """Return times and energies from the last sample before ``since`` up to td, with td itself at its level."""
         first, last = np.searchsorted(self.history.time, (since, self.td))
         states_before = slice(max(int(first) - 1, 0), int(last))
         time = self.history.time[states_before]
@@ -126,7 +126,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @cached_property
     def sunk(self) -> str | None:
-        """Return a doubt if the vibration at td does not exceed the noise of the record, else None."""
+        """Return a doubt if the vibration at td does not exceed the noise of the record, otherwise None."""
         start, end = (
             max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
             max(self.td, self.span.start),
@@ -185,7 +185,7 @@ class OscillatorEnergy(SampledEnergy):
 
     def standstills(self) -> Samples:
         """Return the times in the span up to td at which the energy has an extremum [time]."""
-        # The time td itself may be an extremum, which rounding may place before it.
+        # The time td itself may be an extremum, which rounding may place before td.
         end = self.td - _ZERO / self.mode.omega
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
@@ -207,7 +207,7 @@ class OscillatorEnergy(SampledEnergy):
         )
 
     def within(self, times: Samples) -> NDArray[np.bool_]:
-        """Return for each time whether it lies in the window that the modes describe."""
+        """Return a mask of the times that lie in the window described by the modes."""
         return (times >= self.span.start) & (times <= self.span.end)
 
     def _each(
@@ -216,9 +216,9 @@ class OscillatorEnergy(SampledEnergy):
         inside: Callable[[Samples], Samples],
         outside: Callable[[Samples], Samples],
     ) -> Samples:
-        """Apply one function to times in the window described by the modes, another function to all others."""
+        """Apply one function to times in the window described by the modes, and another function to all other times."""
         is_described = self.within(times)
-        if is_described.all():  # Usually the modes describe all times.
+        if is_described.all():  # Usually, the modes describe all times.
             return inside(times)
         energies = np.empty(times.shape)
         energies[is_described], energies[~is_described] = (
@@ -242,7 +242,7 @@ class Moments:
 
     @classmethod
     def of(cls, kind: str, times: Samples | Sequence[float]) -> Moments:
-        """Make moments of one kind without the direction of the energy."""
+        """Make moments of one kind, without the direction in which the energy changes."""
         none = np.zeros(len(times), np.int8)
         return cls(
             np.array(times, dtype=float), none + np.int8(_KINDS.index(kind)), none
@@ -252,7 +252,7 @@ class Moments:
     def of_level(
         cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments
     ) -> Moments:
-        """Make moments from level crossings, shape (k,), followed by further moments."""
+        """Make moments from level crossings (k,), followed by further moments."""
         kind = np.zeros(crossings.size, np.int8)
         sides = np.where(rising, 1, -1).astype(np.int8)
         return cls.joined([cls(crossings, kind, sides), *others])
@@ -271,7 +271,7 @@ class Moments:
         )
 
     def are(self, kind: str) -> NDArray[np.bool_]:
-        """Return for each moment whether it is of this kind."""
+        """Return a mask of the moments of the given kind."""
         return np.asarray(self.kind == _KINDS.index(kind))
 
     def at(self, places: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Moments:
@@ -311,7 +311,7 @@ def find_moments_of_mode(
         [*(up for _, up in early), mode.energy_slopes(times)[0] > 0]
     )
     turns = seen[int(td.argmax())].standstills()
-    # The time td itself may be an extremum, which rounding may place before it.
+    # The time td itself may be an extremum, which rounding may place before td.
     of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
     moments = Moments.of_level(
@@ -333,7 +333,7 @@ def find_moments_of_mode(
 def compute_sampled_reach(
     history: History, times: Samples, td: float, level: float
 ) -> Samples:
-    """Return the distance to the true crossing if tr is interpolated linearly between samples.
+    """Return the distance to the true crossing [time] if tr is interpolated linearly between samples.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ def compute_sampled_reach(
 def compute_fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
-    """Return the distance to the true crossing if tr and the level follow from the fitted oscillator.
+    """Return the distance to the true crossing [time] if tr and the level are those of the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
     record about it, and the systematic part of the misfit.  Arguments and result are those of
@@ -388,7 +388,7 @@ def compute_fitted_reach(
     error = deviation[:-1] + deviation[-1]
     slope, bend = mode.energy_slopes(times)
     distance = compute_reach(np.abs(slope), np.abs(bend), error)
-    # The error of a crossing is limited to a quarter of a period by the fit, not to an output interval.
+    # The fit limits the error of a crossing to a quarter of a period, not to an output interval.
     quanta = (
         _compute_half_quanta(history.time_precision, times)
         + history.time_precision.quantum(td) / 2
@@ -408,7 +408,7 @@ def _estimate_local_rest(fit: Identification, mode: Mode, at: Samples) -> Sample
 
 
 def _find_cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
-    """Return the index of the sample before each time, and the interval to the next."""
+    """Return the index of the sample before each time, and the interval to the next sample."""
     cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
     return cell, time[cell + 1] - time[cell]
 
@@ -454,7 +454,7 @@ def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> S
 def compute_reach(
     slope: Samples | float, bend: Samples | float, error: Samples | float
 ) -> Samples:
-    """Return the error of a crossing time that follows from the energy error ``error`` [time].
+    """Return the error of a crossing time due to the energy error ``error`` [time].
 
     The smaller root x of slope x - bend x^2/2 = error; if there is no root, the curve may turn before it reaches the
     level, and sqrt(2 error/bend) is the distance at which the bend alone accounts for the error.

@@ -78,12 +78,12 @@ class Oscillator:
 
     @property
     def omega_0(self) -> float:
-        """Return the undamped rate of the vibration, sqrt(k/mu) = sqrt(1 + beta) omega_n [1/time]."""
+        """Return the undamped angular frequency of the vibration, sqrt(k/mu) = sqrt(1 + beta) omega_n [1/time]."""
         return float(np.sqrt(self.stiffness / self.reduced_mass))
 
     @property
     def omega_2(self) -> float:
-        """Return the damped rate of the vibration, equation (4) of the paper [1/time]; NaN if overdamped.
+        """Return the damped angular frequency of the vibration, equation (4) of the paper [1/time]; NaN if overdamped.
 
         Examples
         --------
@@ -124,7 +124,7 @@ class Oscillator:
         return State(z, y, velocity - frame * rate, velocity + suspended * rate)
 
     def free_on_grid(self, start: State, step: float, count: int) -> State:
-        """Return the states at ``step * arange(count)`` of free motion from ``start``, faster than ``free``.
+        """Return the states at ``step * arange(count)`` of free motion from ``start``; this is faster than ``free``.
 
         On an even grid, t = t_row + t_column, every exponential is a product of a factor per row and one per
         column of a table, so a displacement is a matrix product of rank four.  Agrees with ``free`` to a few
@@ -149,7 +149,7 @@ class Oscillator:
         centre, velocity = self._centre(start)
 
         def displacement(share: float) -> Values:
-            """Return the displacement of the mass that takes this share of the deformation."""
+            """Return the displacement of the mass that takes the fraction ``share`` of the deformation."""
             swing = share * amplitude * turn_row
             terms = [
                 swing.real,
@@ -163,7 +163,7 @@ class Oscillator:
             return np.asarray(table.ravel()[:count])
 
         def speed(share: float) -> Values:
-            """Return the velocity of the mass that takes this share of the deformation."""
+            """Return the velocity of the mass that takes the fraction ``share`` of the deformation."""
             swing = share * rate * amplitude * turn_row
             table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
             return np.asarray(
@@ -211,7 +211,7 @@ class Oscillator:
         )
 
     def _share(self, mass: float) -> float:
-        """Return the share of a mass in the sum of both."""
+        """Return a mass as a fraction of the sum of both masses [-]."""
         return mass / (self.frame_mass + self.mass)
 
     def _centre(self, state: State) -> tuple[Values, Values]:
@@ -244,7 +244,7 @@ class Oscillator:
 def _compute_path(alpha: float, t: Values) -> Values:
     """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # For tiny products the quotient loses its digits, whereas two terms of the series are exact.
+    # For tiny products, the quotient loses its digits, whereas two terms of the series are exact.
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),
@@ -255,7 +255,7 @@ def _compute_path(alpha: float, t: Values) -> Values:
 def compute_lacking_energy(
     oscillator: Oscillator, reference: State, switched: State
 ) -> Values:
-    """Return the vibration energy that ``switched`` lacks compared with ``reference``, both states at td."""
+    """Return the vibration energy that ``switched`` lacks compared with ``reference``, both states at td [energy]."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
 
@@ -343,7 +343,7 @@ class Replay:
 
 
 class Trajectory(NamedTuple):
-    """Motion on an even grid of ``time`` (n,): ``state`` and both energies, arrays of the same shape."""
+    """Motion on an even grid of ``time`` (n,): ``state`` and both energies, as arrays of the same shape."""
 
     time: Values
     state: State

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 # Half-width of the error band of R^2 due to noise, in standard deviations.
 _DEVIATIONS: Final = 2.5
-# A hidden mode with at most this effect on R^2 raises only the upper bound of the residual, not its value [-].
+# Largest effect on R^2 of a hidden mode that raises only the upper bound of the residual, not its value [-].
 _HARMLESS: Final = 0.25**2
-# Effect on R^2 of a hidden share that consists of harmonics of a nonlinear spring, as a factor on this share [-].
+# Effect on R^2 of a hidden fraction of harmonics of a nonlinear spring, as a factor on this fraction [-].
 _HARMONIC_COUNTS: Final = 8.0
 
 
@@ -51,13 +51,13 @@ def residual_band(
     off = scatter + share * squared + bent
     opposed = _count_opposed(fit, tr, td)
     decayed = _count_decayed(fit, tr, td)
-    # The misfit may hide a lasting mode or an early decaying mode, of which the one with the larger effect is assumed.
+    # The misfit may hide a lasting mode or an early decaying mode; the one with the larger effect is assumed.
     hidden = np.maximum(fit.hidden_share * opposed, decayed)
     stated_now, low, high = measures.band_about(
         squared, off, hidden, fit.hidden_share * squared
     )
     # A hidden mode is assumed to exist with a probability of 1/2.
-    # So the stated residual includes half of the effect beyond solver errors.
+    # Because of this probability, the stated residual includes half of the effect beyond solver errors.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
@@ -87,7 +87,7 @@ def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
 def _compute_deviation(
     fit: Identification, tr: Samples, td: Samples | float
 ) -> Samples:
-    """Return the standard deviation of R^2 of each tr (n,), due to the uncertainty of the fitted parameters [-].
+    """Return the standard deviation of R^2 for each tr (n,), due to the uncertainty of the fitted parameters [-].
 
     The covariance is scaled to a unit diagonal first: its parameters have different units.
     """

@@ -28,43 +28,43 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# _BEGINNINGS: trial windows begin before td by these shares of the time before td [-].
-# _ENDS: trial windows end after td by these shares of the time after td [-].
+# _BEGINNINGS: distances of the beginnings of trial windows from td, as fractions of the time from the start to td [-].
+# _ENDS: distances of the ends of trial windows from td, as fractions of the time from td to the end [-].
 # One of the trial windows fills most of any flight of several periods.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Further trial windows end before td by these shares of the time before td [-].
-# They are needed if td lies in the next contact.
+# Distances of the ends of further trial windows before td, as fractions of the time from the start to td [-].
+# The further trial windows are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
-# The distance of each mark from the end of the record is this share of the distance of the next mark [-].
+# Ratio of the distances of successive marks from the start of the bounds [-].
 _MARKS = 0.87
 # _LEAST_PERIODS: smallest number of periods of a window that an oscillator describes; fewer may fit by chance.
-# _MOST: a window that an oscillator describes contains at least this share of the fitted samples [-].
+# _MOST: smallest fraction of the fitted samples in a window that an oscillator describes [-].
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# The ends of a window do not belong to the flight if a fit without them reduces the misfit to less than this share [-].
+# Largest ratio of misfits without and with the ends of a window at which the ends are not part of the flight [-].
 _MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
-# _SHARE_OFF: limit of the mean error as a share of the vibration energy [-].
+# _SHARE_OFF: limit of the mean error as a fraction of the vibration energy [-].
 # _ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
 # _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
 # _MEANS_PER_PERIOD: number of mean errors per period.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 # Number of means per energy period that are used to detect a mode in only a part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
-# An oscillator that describes at least this share of the bounds is used for every td in its window [-].
+# Smallest fraction of the bounds described by an oscillator that is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
 _MOST_REFITS = 8
 
-# A hidden mode is ignored if it has less than this share of the vibration energy [-], the error of real solvers.
+# Largest ignored energy of a hidden mode, as a fraction of the vibration energy [-]; it is the error of solvers.
 SMALLEST: Final = 1e-3
 # Largest number of lines in a spectrum, which suffices for 800 periods of the energy.
 _MOST_LINES: Final = 8192
 # Number of points per line of a spectrum, so that its peak is resolved.
 _FINER: Final = 4
-# Number of cells per period of the fastest line, so that the means over cells still contain most of it.
+# Number of cells per period of the highest-frequency line, so that means over cells still contain most of the line.
 _CELLS_PER_PERIOD: Final = 4
-# Pair of times that has no state between them.
+# Pair of times without any state between them.
 _NO_STATE: Final = (np.inf, np.inf)
 
 
@@ -118,7 +118,7 @@ def find_oscillator(
     span : Span or None
         None when no oscillator describes the record around td or before.
     fit : Identification
-        The accepted fit, with the share of a hidden mode, or the reason why none is accepted.
+        The accepted fit, with the fraction of a hidden mode, or the reason why none is accepted.
     """
     if fit_window:
         fit = identify(*history.between(*fit_window))
@@ -211,7 +211,7 @@ def find_described_span(
 def find_longest_described(
     history: History, bounds: Span, whole: bool
 ) -> tuple[Span, Identification] | None:
-    """Find a window with most of the ``bounds`` that one oscillator describes; None if none is found.
+    """Find a window with most of the ``bounds`` that one oscillator describes; None if there is none.
 
     The window is the same for every td in it.  The search starts in the middle of the bounds, which the window
     contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `find_described_span`.
@@ -252,7 +252,7 @@ def _fit_states(
 
 @remember
 def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex128]:
-    """Return the rates in the energies between two states; quick and full fits share them."""
+    """Return the complex exponents in the energies between two states; quick and full fits share them."""
     return find_rates(*history.between(*(ends or _NO_STATE)))
 
 
@@ -334,7 +334,7 @@ def _find_first_off(
     behind: int,
     ahead: int,
 ) -> int | None:
-    """Return the index of the first mean, at or after index ``first``, that exceeds its limit.
+    """Return the index of the first mean, at or after the index ``first``, that exceeds its limit; None if none does.
 
     The search goes outwards block by block, so that no sum contains the large errors beyond the end of the window.
     """
@@ -354,7 +354,7 @@ def _find_first_off(
 
 
 def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Samples:
-    """Return means of ``behind`` values before each value and ``ahead`` after it, starting at index ``first``."""
+    """Return means of ``behind`` values before each value and ``ahead`` after it, starting at the index ``first``."""
     needed = values[max(first - behind, 0) :]
     width = behind + 1 + ahead
     sums = np.zeros(values.size - first + width)
@@ -365,7 +365,7 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
 
 
 def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Span]:
-    """Yield trial windows: first windows around td, from the longest, then windows before td."""
+    """Yield trial windows: first windows around td, longest first, then windows before td."""
     start, end = bounds
     mark_of_td = _mark(bounds, td)
     beginnings = [start]
@@ -396,7 +396,7 @@ def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Sp
 
 
 def _mark(bounds: Span, time: float, after: int = 0) -> float:
-    """Return the last mark at or before ``time``, or the first ``after`` it; the ends of the bounds are marks too."""
+    """Return the last mark at or before ``time``, or the first ``after`` it; the ends of the bounds are marks, too."""
     start, end = bounds
     if time <= start:
         return start
@@ -473,7 +473,7 @@ def _clear_ends(
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
-    """Return the share of the vibration energy that a further mode, hidden in the misfit, may have [-].
+    """Return the fraction of the vibration energy that a further mode, hidden in the misfit, may have [-].
 
     This share is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most
     1.
@@ -492,7 +492,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
         s, integrate_by_trapezia(s, energy - mode.energy(time)), count
     )
     decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
-    # The range is from one period in the record to the fastest line that the cells resolve.
+    # The range is from one period in the record to the highest frequency that the cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     strongest = float(
         np.abs(np.fft.rfft(remainder * decay, _FINER * count))[visible].max()
@@ -505,7 +505,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
 def measure_deviations(
     time: Samples, energy: Samples, fit: Identification
 ) -> tuple[Samples, Samples]:
-    """Return times, and the deviation of the energy from the fit near each time, beyond noise.
+    """Return times, and the deviation of the energy from the fit near each time as far as it exceeds noise.
 
     A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
     deviation is the largest mean over a quarter of a period of the energy, within one such period.

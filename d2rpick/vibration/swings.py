@@ -24,25 +24,25 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turning point is counted if the next change of the energy is at least this share of the last change [-].
+# Smallest change of the energy after an extremum that is counted, as a fraction of the previous change [-].
 _SWING: Final = 0.2
-# A minimum is not on the lower envelope if it deviates from the line through its neighbours by this share [-].
+# Largest deviation of a minimum on the lower envelope from the line through its neighbours, as a fraction [-].
 _OFF_FLOOR: Final = 0.02
-# Half cycles are not counted if more than this share of the minima is not on the lower envelope [-].
+# Largest fraction of the minima off the lower envelope at which half cycles are counted [-].
 _MOST_OFF: Final = 0.1
 # Smallest number of minima that define a lower envelope.
 _FEWEST: Final = 5
-# In a beat, neighbouring half cycles differ in length by at least this share [-].
-# The difference is about half of the energy share of the other mode, so this is a share of 0.02.
+# Smallest relative difference in length of neighbouring half cycles in a beat [-].
+# The difference in length is about half of the energy fraction of the other mode, which is therefore 0.02.
 _UNEVEN: Final = 0.009
-# _MOST_BEATING: more than this share of the half cycles alternates if two modes beat [-].
-# _STRETCHED: relative difference in length over that in height in a beat; a preload gives 0.3 [-].
+# _MOST_BEATING: largest fraction of the half cycles that alternate without a beat of two modes [-].
+# _STRETCHED: smallest ratio of relative differences in length and in height in a beat [-]; a preload gives 0.3.
 _MOST_BEATING, _STRETCHED = 0.75, 1.3
 # Factor by which the residual may be larger or smaller because the spring law is unknown [-].
 # In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
-# _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of the hidden share [-].
-# In theory this factor is 2, but the lower envelope shows only a part of a hidden mode.
+# _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of its energy fraction [-].
+# In theory, the factor is 2, but the lower envelope shows only a part of a hidden mode.
 # _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
 # In 1,378 records of two modes, 98.2 % of the residuals below 0.3 were in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05
@@ -76,11 +76,11 @@ class Swings(SignedAmplitudes):
     undescribed: ClassVar = "the swings of the energy cannot be counted from here to td"
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Return the signed deformation, with the shape of ``t`` and a first axis of length one [sqrt(energy)]."""
+        """Return the signed deformation, in the shape of ``t`` with a first axis of length one [sqrt(energy)]."""
         return np.asarray(np.interp(t, self.time, self.deformation))[np.newaxis]
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return the kinetic energy of the vibration: the estimated vibration energy minus the elastic energy."""
+        """Return the kinetic energy of the vibration, the estimated vibration energy minus the elastic energy."""
         return np.asarray(self.vibration_energy(t) - self.amplitudes(t)[0] ** 2)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
@@ -90,7 +90,7 @@ class Swings(SignedAmplitudes):
         )
 
     def comparable_since(self, td: float) -> float:
-        """Return the earliest time whose sign can be compared with that at ``td`` [time]."""
+        """Return the earliest time at which the sign of the deformation can be related to that at ``td`` [time]."""
         unclear_before = self.unclear[self.unclear < td]
         return float(unclear_before[-1] if unclear_before.size else self.time[0])
 
@@ -104,7 +104,7 @@ class Swings(SignedAmplitudes):
         )
 
     def profile(self, td: float) -> Profile:
-        """Return frozen-deformation errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return frozen-deformation errors at the times before ``td`` at which the sign of the deformation is known."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
@@ -127,7 +127,7 @@ class Swings(SignedAmplitudes):
         return likely, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the share of the vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
+        """Return the fraction of vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
 
         It follows from the variation of the floor about its line, for heat and drift move the floor slowly; a floor of
         almost nothing hides no more than itself.
@@ -200,7 +200,7 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
 
 
 def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
-    """Return True if half cycles alternate as in the beat of two modes with rates 2 to 3, 2 to 5 or 2 to 7.
+    """Return True if half cycles alternate as in the beat of two modes with frequency ratios 2:3, 2:5 or 2:7.
 
     The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
     preload and goes farther there, by equal shares.  In a beat the longer swing is the lower one, or the swings differ
@@ -229,10 +229,10 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
 
 
 def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
-    """Return the indices of the energy's turning points, and the last turning point that is completely visible."""
+    """Return the indices of the energy extrema, and the last extremum that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    # This many turning points can only be noise.
+    # So many extrema can only be noise.
     if 4 * turning_points.size > energy.size:
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
@@ -258,7 +258,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
-    """Return values on straight lines through points, extrapolated from the first two and the last two."""
+    """Return values on straight lines through points, extrapolated from the first two and the last two points."""
     first, last = (
         y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
         for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))

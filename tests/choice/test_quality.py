@@ -2,12 +2,15 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from d2rpick.api import read, verify
 from d2rpick.choice.answers import suggest_in_history, verify_in_history
 from d2rpick.choice.pair.grades import GRADES
 from d2rpick.choice.pair.quality import (
@@ -502,3 +505,25 @@ def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> N
     assert places_above == sorted(
         places_above, key=lambda place_in_order: -rigid[place_in_order]
     )
+
+
+def test_a_given_flight_that_the_momentum_contradicts_is_not_advised_again(
+    tmp_path: Path,
+) -> None:
+    time = np.linspace(0, 0.08, 401)
+    columns = {
+        "time": time,
+        "internal_energy": 1 + 0.5 * np.cos(600 * time) ** 2,
+        "kinetic_energy": 10 + np.sin(200 * time),
+        "x_momentum": np.sin(90 * time),
+        "y_momentum": 0.0,
+        "z_momentum": 3 * np.sin(150 * time),
+    }
+    table = tmp_path / "driven.csv"
+    pd.DataFrame(columns).to_csv(table, index=False)
+    judged = verify(read(table), 0.015708, 0.0471239, after=0.01)
+    causes = require(judged.quality).motion.causes
+    assert len(causes) == 1
+    assert "although the momentum shows no free flight" in causes[0].reason
+    assert "without `after`" in causes[0].cure
+    assert "give the end of the load" not in causes[0].cure

@@ -447,3 +447,23 @@ def test_a_pyproject_without_a_table_for_us(tmp_path: Path, text: str) -> None:
 def test_a_near_miss_is_named() -> None:
     with pytest.raises(ConfigurationError, match="did you mean D2R101"):
         Configuration(ignore=("D2R10l",)).verify(["D2R101"])
+
+
+def test_the_cure_of_an_active_nodal_body_is_no_mistake_itself(tmp_path: Path) -> None:
+    """A body that also holds a deformable part must not be deleted (D2R120), so D2R112 does not advise it."""
+    deleted = RULES["D2R120"].failing[-1].deck
+    active = re.sub(
+        r"(\$ +nrbf.*\n) {9}[12]", lambda card: card[1] + f"{0:10d}", deleted
+    )
+    messages = {
+        rule: [
+            finding.message
+            for finding in check_deck(write(tmp_path, deck)).findings
+            if finding.rule == rule
+        ]
+        for rule, deck in (("D2R112", active), ("D2R120", deleted))
+    }
+    (advice,) = messages["D2R112"]
+    assert "it also holds part 2, so do not delete it" in advice
+    assert "set the flag" not in advice
+    assert len(messages["D2R120"]) == 1

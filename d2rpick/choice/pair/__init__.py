@@ -1,1 +1,1 @@
-"""Judge pairs (tr, td) at one td: situation, candidates, quality, warnings, windows, and the decision."""
+"""Judge pairs (tr, td) at one td: situation, candidates, quality, warnings, windows, and the verdict."""

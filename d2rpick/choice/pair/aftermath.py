@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
-# Relative error of vibration energies that follow from spectral lines or counted oscillations [-].
+# Relative error of vibration energies that are derived from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest assumed number of similar modes with random phases; a computed car had 100 such modes.
-# The total energy of m such modes has a relative standard deviation of 1/sqrt(8 m).
+# Largest number of similar modes with random phases that is assumed; a computed car had 100 such modes.
+# The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# In computed runs, the mean energy after td exceeds its prediction from spectral lines by at most this share [-].
+# Largest relative excess of the mean energy after td over its prediction from spectral lines, in computed runs [-].
 _OF_SOLVER: Final = 0.005
-# Smallest number of states from which the fluctuation of the energy is determined.
+# Smallest number of states needed to determine the fluctuation of the energy.
 _FEWEST_STATES: Final = 8
 
 
@@ -50,7 +50,7 @@ class MeanEnergyBounds(NamedTuple):
 def bound_mean_energy(
     situation: Situation, candidate: Candidate
 ) -> MeanEnergyBounds | None:
-    """Return bounds of the mean energy after td for one tr; None if they are unknown."""
+    """Return bounds of the mean energy after td for one tr; None if the bounds are unknown."""
     if situation.at_rest:
         return MeanEnergyBounds(1.0, 1.0)
     ratios = [
@@ -65,7 +65,7 @@ def bound_mean_energy(
     if situation.basis != "oscillator":
         low = low - _OF_SOLVER
         high = high + _OF_SOLVER
-    # Vibrating parts that were not chosen may transfer their energy to the chosen parts.
+    # Vibrating parts that the user did not choose may transfer their energy to the chosen parts.
     other_energy = situation.together.not_chosen.energy
     return MeanEnergyBounds(
         max(low, 0.0),
@@ -76,7 +76,7 @@ def bound_mean_energy(
 def _compute_mean_ratio(
     energy_tr: float, energy_td: float, elastic_td: float, whole: float
 ) -> float:
-    """Return the mean energy after td, relative to the reference run [-].
+    """Return the mean energy after td relative to the reference run [-].
 
     ``elastic_td`` and ``whole`` are the elastic and the whole vibration energy at td [energy].
     """
@@ -104,7 +104,7 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
     time, energy = select_energies_in_flight(situation)
     mean = float(np.mean(energy))
     damping_left = 1 / compute_mean_decay(situation, time)
-    # On average, half of the vibration energy is internal energy, which adds to the static energy.
+    # On average, half of the vibration energy is internal energy, which is added to the static energy.
     return [
         (max(situation.energy_td - (mean - whole / 2), 0.0), damping_left * whole)
         for whole in bounds
@@ -112,7 +112,7 @@ def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]
 
 
 def bound_vibration_energy(situation: Situation) -> tuple[float, float] | None:
-    """Return the smallest and largest vibration energy that can cause the fluctuations in the flight [energy].
+    """Return the smallest and largest vibration energy that can cause the energy fluctuations in the flight [energy].
 
     No vibration fluctuates by more than its energy; many modes out of step fluctuate by much less.
     """
@@ -165,7 +165,7 @@ def compare_error_with_contact(
 
 @remember
 def find_energy_of_next_contact(history: History, flight: Flight) -> float | None:
-    """Return the energy that the next contact puts into the parts [energy]; None if no contact is seen.
+    """Return the energy that the next contact puts into the parts [energy]; None if the record shows no contact.
 
     This energy is the rise of the internal energy after the flight that the record shows, or else the kinetic energy of
     the approach at the end of the flight.

@@ -30,18 +30,18 @@ if TYPE_CHECKING:
     from d2rpick.vibration.measures import Columns
 
 
-# Largest number of candidates that are judged together; larger arrays need more memory and are not faster.
+# Largest number of candidates that are judged in one batch; larger arrays need more memory and are not faster.
 _MOST: Final = 20_000
-# Largest factor by which the number of td that are judged together grows from one batch to the next.
+# Largest growth factor of the number of td judged together, from one batch to the next [-].
 _MORE: Final = 8
-# A candidate gets a note if the upper bound of its residual exceeds the residual by this much [-].
+# Largest excess of the upper bound of a residual over the residual without a note on the candidate [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
 
 
 class Candidate(Measured, Record):
-    """One tr for the td of a situation; the fields are the keys of the JSON output; unknown values are None.
+    """One tr for the td of a situation; the fields are the keys of the JSON output, None if unknown.
 
     Times have the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction`` have no
     unit.  ``kind`` is "crossing" of the level, "extremum" near the level, "match" of the deformations of several modes,
@@ -88,7 +88,7 @@ class Candidate(Measured, Record):
 
 
 class Pair(NamedTuple):
-    """A recommended (tr, td) [time].
+    """A recommended pair of times (tr, td) [time].
 
     Pairs at different td are compared by ``error``, which is the ``residual`` if that is known; ``residual_high`` is
     its upper bound.
@@ -109,7 +109,7 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Judged:
-    """Candidates for tr at one or many td of a record, judged by flight, sign and tolerance.
+    """Candidates for tr at one or many td of a record, judged by flight, deformation sign and tolerance.
 
     All columns have shape (n,); those of one td are adjacent, in the order of ``situations``.  ``situation_of`` is the
     index into ``situations``.  ``columns`` has the fields of a candidate by name: its measures, ``energy``,
@@ -126,11 +126,11 @@ class Judged:
     def of(
         cls, situations: Sequence[Situation], moments_of_each: Sequence[Moments]
     ) -> Judged:
-        """Measure and judge the ``moments`` of each situation; if nothing vibrates, no measure is used."""
+        """Measure and judge the ``moments`` of each situation as tr; nothing is measured if nothing vibrates."""
         sizes = [len(moments) for moments in moments_of_each]
         ends = [0, *accumulate(sizes)]
         if len(moments_of_each) == 1:
-            # A noisy record has large arrays, which must not be copied.
+            # The arrays of a noisy record are large, so they must not be copied.
             moments = moments_of_each[0]
             place = np.broadcast_to(np.int32(0), sizes[0])
         else:
@@ -144,7 +144,7 @@ class Judged:
         energy, measured = measure_all(vibrations, tr, ends)
         level_error = measures.level_error(energy, energy_td)
         if at_rest.any():
-            # If nothing vibrates, the ratio of the energies is only that of rounding errors.
+            # If nothing vibrates, the energy ratio contains nothing but rounding errors.
             level_error[at_rest] = 0.0
             measured = {
                 name: np.where(at_rest, np.nan, column)
@@ -189,7 +189,7 @@ class Judged:
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
-        """True for each candidate to which there is no objection, shape (n,)."""
+        """True for each candidate without objections, shape (n,)."""
         return np.asarray(
             ~np.logical_or.reduce([objection.holds for objection in self.objections])
         )
@@ -201,14 +201,14 @@ class Judged:
 
     @property
     def within_limits(self) -> NDArray[np.bool_]:
-        """True for each candidate that exceeds no limit of the settings, shape (n,)."""
+        """True for each candidate that exceeds none of the limits in the settings, shape (n,)."""
         keeps = np.ones(self.situation_of.size, np.bool_)
         for limit, value in self.situations[0].settings.limits:
             keeps &= limit.is_kept_by(self.get_quantity(limit.quantity), value)
         return keeps
 
     def get_quantity(self, name: str) -> Samples:
-        """Return a quantity of each candidate by name, shape (n,): a column, or an attribute of its situation."""
+        """Return a quantity by name for each candidate, shape (n,): a column, or an attribute of its situation."""
         if name in self.columns:
             return self.columns[name]
         values = [getattr(situation, name) for situation in self.situations]
@@ -216,9 +216,9 @@ class Judged:
 
     @property
     def error(self) -> Samples:
-        """Error by which the candidates are ranked, as `Candidate.error`, shape (n,) [-]."""
+        """Error by which the candidates are ranked, see `Candidate.error`, shape (n,) [-]."""
         residual = self.columns["residual"]
-        # A wide error band worsens the rank of a candidate, because the smallest of many estimates is too optimistic.
+        # Candidates with a wide error band rank lower, because the smallest of many estimates is too optimistic.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
         error = np.where(
             np.isnan(residual),
@@ -229,21 +229,21 @@ class Judged:
 
     @property
     def modal(self) -> NDArray[np.bool_]:
-        """True for each candidate that is judged with many modes, shape (n,)."""
+        """True for each candidate that is judged by the model with many modes, shape (n,)."""
         return np.array([situation.basis == "modal" for situation in self.situations])[
             self.situation_of
         ]
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate that is judged with many modes and saves little, because it is close to td."""
+        """True for each candidate of the model with many modes that saves little because it is close to td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
-        """True for each candidate whose position error deserves a warning, shape (n,)."""
+        """True for each candidate whose position error is large enough for a warning, shape (n,)."""
         limits = [
             np.inf if situation.bodies is None else situation.bodies.limit
             for situation in self.situations
@@ -253,7 +253,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Return the candidates in the given ``rows``; their objections are left out."""
+        """Return the candidates in the given ``rows``, without their objections."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
@@ -262,7 +262,7 @@ class Judged:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """A lazy sequence of the candidates of one td in a given order; each candidate is built when it is accessed.
+    """A lazy sequence of the candidates of one td in order of rank; each candidate is built when it is accessed.
 
     ``order`` has the row numbers of the candidates in ``judged``; these are ranked if ``ranked`` is True.
     ``recommended`` is the position of the recommended candidate in ``order``, None if there is none.
@@ -276,12 +276,12 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def tr(self) -> Samples:
-        """Times of the switch to rigid, in the order of the candidates [time]."""
+        """Times of the switch to rigid, in order of rank [time]."""
         return self.judged.moments.tr[self.order]
 
     @property
     def recommendable(self) -> NDArray[np.bool_]:
-        """True for each candidate, in order, that is acceptable and within the limits of the settings."""
+        """True for each candidate, in order of rank, that is acceptable and within the limits of the settings."""
         return self.judged.recommendable[self.order]
 
     @cached_property
@@ -291,7 +291,7 @@ class Candidates(Sequence[Candidate]):
 
     @cached_property
     def pair(self) -> Pair | None:
-        """The recommended pair, which is computed faster than the candidate; None if no pair is recommended."""
+        """The recommended pair, which is faster to compute than the candidate; None if no pair is recommended."""
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
@@ -323,11 +323,11 @@ class Candidates(Sequence[Candidate]):
     @overload
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
-        """Build the candidate at a position of the order, or the candidates of a slice."""
+        """Build the candidate at a position in the ranking, or the candidates of a slice."""
         if not isinstance(place, slice):
             i = range(len(self))[place]
             return self[i : i + 1][0]
-        # The accuracy of a time takes longer to compute than the choice, so it is computed only on access.
+        # The accuracy of tr takes longer to compute than the choice, so it is computed only on access.
         reach = self.situation.vibration.reach(
             _mark_given_as_matches(
                 self.situation, self.judged.moments.at(self.order[place])
@@ -347,7 +347,7 @@ class Candidates(Sequence[Candidate]):
             name: _replace_nan(column[i].item())
             for name, column in judged.columns.items()
         }
-        # The value is True if the deformations at tr and td were compared.
+        # The sign match is None if the deformations at tr and td were not compared.
         is_compared = values["sign_match"] is not None
         values["sign_match"] = values["sign_match"] > 0 if is_compared else None
         history = situation.history
@@ -364,7 +364,8 @@ class Candidates(Sequence[Candidate]):
         is_kept = residual is None or residual <= POOR_RESIDUAL
         if values["same_swing"]:
             notes.append(_SAME_SWING)
-        notes += _list_remarks(situation, reach, values if is_compared else {})
+        measured = values if is_compared else {}
+        notes += _list_remarks(situation, reach, measured, notes)
         level_ratio = None
         if situation.energy_td > 0 and not situation.at_rest:
             level_ratio = values["energy"] / situation.energy_td
@@ -399,7 +400,7 @@ def _replace_nan(value: Any) -> Any:
 def judge_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
 ) -> Iterator[Judged]:
-    """Judge all candidates before td in time order: level crossings, extrema near the level, and closest matches.
+    """Judge all candidates before td in time order: level crossings, energy extrema near the level, closest matches.
 
     If nothing vibrates in the flight, its start is the only candidate.  With ``in_flight``, candidates before the
     flight may be omitted: none of them is acceptable, and noise in a long record makes tens of thousands.  All
@@ -426,13 +427,13 @@ def judge_candidates(
 
 
 def judge_times(situation: Situation, times: Iterable[float]) -> Candidates:
-    """Measure each of the ``times`` before td as tr, and judge it by flight, sign and tolerance."""
+    """Judge each of the ``times`` before td as tr, by flight, deformation sign and tolerance."""
     judged = Judged.of([situation], [Moments.of("given", [*times])])
     return Candidates(situation, judged, np.arange(judged.situation_of.size))
 
 
 def _find_start_at_rest(situation: Situation) -> Moments | None:
-    """Return the start of a flight, rounded up to printed digits, if nothing vibrates in the flight; otherwise None."""
+    """Return the start of the flight, rounded up to printed digits, if nothing vibrates in it; otherwise None."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
@@ -442,7 +443,7 @@ def _find_start_at_rest(situation: Situation) -> Moments | None:
 
 
 def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
-    """Give each tr that coincides with a match the kind "match", since it has the same accuracy."""
+    """Give each tr that coincides with a closest match the kind "match", because its accuracy is the same."""
     is_given = moments.are("given")
     vibration = situation.vibration
     if situation.at_rest or not (is_given.any() and vibration.profile):
@@ -462,7 +463,7 @@ def _mark_given_as_matches(situation: Situation, moments: Moments) -> Moments:
 
 
 def _select_distinct(situation: Situation, moments: Moments) -> Moments:
-    """Return the moments in time order; matches next to a crossing or an extremum are left out."""
+    """Return the moments in time order, without closest matches next to a crossing or an extremum."""
     matches = moments.are("match")
     if matches.any():
         is_distinct = ~matches
@@ -481,10 +482,13 @@ def _list_remarks(
     situation: Situation,
     reach: float,
     measured: Mapping[str, Any],
+    objections: Sequence[str],
 ) -> Iterator[str]:
-    """Yield the notes on a tr that do not affect whether it is acceptable."""
+    """Yield the notes on a tr that do not affect whether it is acceptable, in addition to the objections."""
+    undescribed = situation.vibration.undescribed
     if not (measured or situation.vibration.unknown or situation.at_rest):
-        yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
+        why = "" if undescribed in objections else f": {undescribed}"
+        yield f"direction, frozen-deformation error and residual unknown{why}"
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:

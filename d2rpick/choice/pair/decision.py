@@ -1,4 +1,4 @@
-"""Decide on one verdict for a pair, with its reason, the expected and the worst motion after td, and a better pair.
+"""Decide on the verdict for a pair, with its reason, the expected and the worst motion after td, and a better pair.
 
 All commands, output forms and pages use the texts of this module, so that they cannot contradict each other.
 """
@@ -31,11 +31,13 @@ CHECK_SWITCHED_RUN: Final = (
 # _USE_BEST: advice if the best pair in the given range of td can be used with care.
 # _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
-    "use this pair if only the motion matters, compare it with a finished switched run (d2rpick verify), "
-    "or make fewer parts rigid (d2rpick parts)"
+    "use this pair if only the motion matters, or compare it with a finished switched run "
+    "(d2rpick verify)"
 )
-_AVOID_BEST: Final = "choose another flight, or make other parts rigid (d2rpick parts)"
-# The worst case is not shown separately if it exceeds the expected residual by less than this [-].
+_AVOID_BEST: Final = "choose another flight, or make other parts rigid"
+# _USE_COMPARED: advice of _USE_BEST if the comparison has been made.
+_USE_COMPARED: Final = "use this pair if only the motion matters"
+# Largest excess of the worst-case residual over the expected residual at which no worst case is shown [-].
 _ALIKE: Final = 5e-3
 
 
@@ -64,6 +66,8 @@ class Decision(NamedTuple):
         What to do about the objections if there is no better pair.
     best_of : (float, float) or None
         Range of td of which the pair is the best [time]; None if not all its td were compared.
+    is_compared : bool
+        True if a finished switched run was compared with the reference run.
     """
 
     grade: str
@@ -76,6 +80,7 @@ class Decision(NamedTuple):
     better: Pair | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
     best_of: tuple[float, float] | None = None
+    is_compared: bool = False
 
     @property
     def verdict(self) -> str:
@@ -102,7 +107,7 @@ class Decision(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """Reason for a verdict that is not "use", without numbers, so that several pairs can share it."""
+        """Reason for a verdict other than "use", without numbers, so that several pairs can share it."""
         if self.objections:
             return "; ".join(self.objections)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
@@ -115,14 +120,14 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration limits the verdict although its grade was raised because its error hardly matters."""
+        """True if the vibration limits the verdict, although its grade was raised because its error hardly matters."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
 
     @property
     def expected(self) -> str:
-        """Description of the expected motion after td."""
+        """Description of the motion expected after td."""
         if self.at_rest:
             return "the same as in the reference run: nothing vibrates in the flight up to td"
         parts = []
@@ -136,7 +141,7 @@ class Decision(NamedTuple):
 
     @property
     def worst_case(self) -> str:
-        """Description of the worst motion after td that the record allows."""
+        """Description of the worst motion after td that is consistent with the record."""
         if self.at_rest:
             return "the same"
         if self.residual is None:
@@ -148,7 +153,7 @@ class Decision(NamedTuple):
 
     @property
     def cure(self) -> str:
-        """The change that would make the pair better; empty if the pair is good."""
+        """The change that would make the pair better; empty if the pair is already good."""
         if self.grade == GOOD:
             return ""
         if self.better is not None:
@@ -159,11 +164,12 @@ class Decision(NamedTuple):
         return "; ".join(cures)
 
     def specify_cure(self, cause: Cause) -> str:
-        """Return the advice that removes a cause; other times are not advised if the pair is the best of a range."""
+        """Return the advice that removes a cause; other times are not advised if the pair is the best of a td range."""
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of
-        advice = _AVOID_BEST if self.grade == POOR else _USE_BEST
+        usable = _USE_COMPARED if self.is_compared else _USE_BEST
+        advice = _AVOID_BEST if self.grade == POOR else usable
         return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
 
 
@@ -176,7 +182,7 @@ def decide(
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
 ) -> Decision:
-    """Decide on a tr in a situation. Any ``objections`` make it inadmissible; ``better`` is a better pair.
+    """Decide on a tr in a situation. Any of the ``objections`` makes it inadmissible; ``better`` is a better pair.
 
     If there is no better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of
     which the pair is the best [time], if all were compared.
@@ -197,7 +203,7 @@ def decide(
 
 
 def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
-    """Return the largest residual that the record allows [-].
+    """Return the largest residual that is consistent with the record [-].
 
     If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
     """
@@ -209,7 +215,7 @@ def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 
 def _explain_why_good(quality: Quality, residual: float | None) -> str:
-    """Explain why a pair is good: its vibration is preserved, or the error of the vibration hardly matters."""
+    """Explain why a pair is good: its vibration is preserved, or the error of its vibration hardly matters."""
     if quality.alone.grade == GOOD:
         error = "" if residual is None else f" with an error of {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{error}"
@@ -225,13 +231,13 @@ def _explain_raised_grade(quality: Quality) -> str:
 
 
 def format_bounds(bounds: MeanEnergyBounds) -> str:
-    """Format the bounds of the mean energy, as one number if both are displayed alike."""
+    """Format the bounds of the mean energy, as a single number if both have the same digits."""
     low, high = f"{bounds.low:.0%}", f"{bounds.high:.0%}"
     return low if low == high else f"{low} to {high}"
 
 
 def _describe_pair(pair: Pair) -> str:
-    """Describe a pair, with its residual if that is known."""
+    """Describe a pair by its times, with its residual if that is known."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     if pair.residual is None:
         return times

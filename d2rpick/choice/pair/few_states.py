@@ -1,4 +1,4 @@
-"""Warn if a file has too few states for the level of a fluctuating energy."""
+"""Warn if a file has too few states to determine the level of a fluctuating energy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# Files that LS-DYNA usually writes more often than a d3plot.
+# Files for which LS-DYNA usually has a shorter output interval than for d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 

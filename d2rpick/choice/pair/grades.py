@@ -1,10 +1,10 @@
-"""Define the grades of a pair and their verdicts, without importing numpy, which the grading itself needs."""
+"""Define the grades of a pair and their verdicts, without importing numpy, which only the grading itself needs."""
 
 from __future__ import annotations
 
 from typing import Final
 
-# The following three grades of a pair are in ascending order.
+# Grades of a pair in ascending order.
 POOR: Final = "poor"
 FAIR: Final = "fair"
 GOOD: Final = "good"

@@ -30,34 +30,37 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.aftermath import Worth
     from d2rpick.choice.pair.candidates import Candidate, Judged
     from d2rpick.choice.pair.situation import Situation
+    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Deformation errors are treated as equal to the smallest one if they exceed it by at most this value [-].
+# Largest excess over the smallest deformation error at which deformation errors are treated as equal [-].
 EQUALLY_GOOD = 0.02
-# Level errors of pairs are treated as equal if they differ by at most this value [-].
-# Smaller differences do not matter, because the level predicts the mean energy after td to 10 % at best.
+# Largest difference at which the level errors of pairs are treated as equal [-].
+# Smaller level differences do not matter, because the level predicts the mean energy after td to 10 % at best.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Largest level error that rounding may cause at a crossing, for levels above this share of the highest energy [-].
+# Largest level error due to rounding at a crossing, for levels above this fraction of the highest energy [-].
 ROUNDING: Final = 1e-3
-# Errors are compared after rounding to this many decimals, so that round-off does not determine the order of pairs.
+# Number of decimals to which errors are rounded before comparison, so that round-off does not affect the ranking.
 _DECIMALS: Final = 4
-# Rigid times that differ from the longest by at most this share are treated as equal [-].
+# Largest relative difference from the longest rigid time at which rigid times are treated as equal [-].
 _LIKE_TIMES = 0.1
 
-# A good pair has at most this residual [-], which is also the default tolerance for tr.
+# Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
-# Largest upper bound of the residual of a good pair [-], which includes the effect of a mode hidden in the misfit.
+# Largest upper bound of the residual of a good pair [-]; the bound includes modes hidden in the misfit.
 _MOST_HIDDEN: Final = 0.3
-# An energy has crossed its mean only if it then deviates from it by this share of the standard deviation [-].
+# Smallest deviation at which the energy is treated as above or below its mean, in standard deviations [-].
 _BAND: Final = 0.25
 # The following limits of the vibration error are explained in docs/explanation/validation-vibration.md.
-# _HARDLY_GOOD: a pair is good if the energy of its error is below this share of the energy of the next contact [-].
-# MOST_WORTH_OF_FAIR: a pair is fair if the energy of its error is below this share of the energy of the contact [-].
+# _HARDLY_GOOD: largest energy of the vibration error of a good pair, relative to the energy of the next contact [-].
+# MOST_WORTH_OF_FAIR: largest energy of the error of a fair pair, relative to the energy of the next contact [-].
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
-# Number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
+# Smallest number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# A sentence names at most this number of parts.
+# Smallest number of states up to td at which another cure than more states is named.
+_FEW_STATES: Final = 20
+# Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
@@ -68,7 +71,7 @@ _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 def rank_candidates(
     situations: Sequence[Situation], *, in_flight: bool = False
 ) -> Iterator[Candidates]:
-    """Yield, for each td of a record, its ranked candidates and which of them is recommended."""
+    """Yield the ranked candidates for each td of a record, with the recommended candidate."""
     return chain.from_iterable(
         map(rank_judged, judge_candidates(situations, in_flight=in_flight))
     )
@@ -114,19 +117,19 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
 
 def get_limit_of_like_quality(situation: Situation) -> float:
-    """Return the largest difference between errors that are equally good [-], for deformations or for energy levels."""
+    """Return the largest difference of equally good errors [-], for deformations or for energy levels."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
 def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
-    """Return True for each residual of a good pair, with its upper bound, both of shape (n,) [-]; False for NaN."""
+    """Return True for each good pair, given its residual and the upper bound of it, shape (n,) [-]; False for NaN."""
     return (residual <= MOST_GOOD) & (highest <= _MOST_HIDDEN)
 
 
 def is_within_band(
     error: Samples, expected: Samples, error_of_best: Samples, best: Samples
 ) -> NDArray[np.bool_]:
-    """Return True for each pair that cannot be distinguished from the best one within its error band.
+    """Return True for each pair that cannot be distinguished from the best pair within the error band of the best pair.
 
     All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
@@ -134,7 +137,7 @@ def is_within_band(
     of that.  It is also on the same side of the limits of a grade, and of the residual of no vibration.
     """
     limit = np.maximum(error_of_best, best)
-    # Numpy warnings are not needed, because the bound is unknown if all errors are infinite.
+    # Numpy warnings are suppressed, because infinite errors leave the bound undefined.
     with np.errstate(invalid="ignore"):
         highest = np.sqrt(np.fmax(2 * error_of_best**2 - best**2, limit**2))
     for bound in (POOR_RESIDUAL, NOTHING_KEPT):
@@ -143,7 +146,7 @@ def is_within_band(
 
 
 class Errors(NamedTuple):
-    """Errors of n candidates, of shape (n,): the ``error`` by which they are ranked, and the ``expected`` error [-].
+    """Errors of n candidates, shape (n,): the ``error`` by which they are ranked, and the ``expected`` error [-].
 
     The two differ by half of the band.  ``is_good`` is True for candidates that are all equally good.
     """
@@ -160,7 +163,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates by group; in each group, the equally good best candidates come first.
+    """Return the order of the candidates, group by group; in each group, the equally good best candidates come first.
 
     These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
     (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
@@ -205,14 +208,14 @@ def order_by_quality(
 def _find_extremes(
     extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Return the smallest or largest value of each group; ``extreme`` is ``np.minimum`` or ``np.maximum``."""
+    """Return the smallest or largest value in each group; ``extreme`` is ``np.minimum`` or ``np.maximum``."""
     extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
     extreme.at(extremes, group, values)
     return extremes
 
 
 class Excess(NamedTuple):
-    """A limit that a pair exceeds, or for which the value is unknown, with its ``message``.
+    """A limit that a pair exceeds, or that cannot be tested because the value is unknown, with its ``message``.
 
     ``is_td_wrong`` is True if the value is known and depends on td only, so that no other tr helps.
     """
@@ -224,7 +227,7 @@ class Excess(NamedTuple):
 def list_exceeded_limits(
     situation: Situation, candidate: Candidate
 ) -> tuple[Excess, ...]:
-    """Return the limits of the settings that a candidate exceeds, or for which its value is unknown."""
+    """Return the limits in the settings that a candidate exceeds, or for which its value is unknown."""
     exceeded = []
     for limit, value in situation.settings.limits:
         of_td = limit.quantity not in candidate._fields
@@ -235,12 +238,12 @@ def list_exceeded_limits(
     return tuple(exceeded)
 
 
-# Last part of a cure; it is left out if the switched run is already there.
+# End of the advice on a pair; it is omitted if the finished switched run is already available.
 _OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 class Cause(NamedTuple):
-    """The ``reason`` why a grade is not better, and the ``cure`` that would improve it.
+    """The ``reason`` why a grade is not better, and the ``cure`` that would improve the grade.
 
     ``needs_other_times``: the cure is another tr or td.  ``kind`` is the reason without the numbers of this pair,
     by default the reason itself; with it a table explains once what several pairs have in common.
@@ -253,13 +256,17 @@ class Cause(NamedTuple):
 
     @property
     def general_reason(self) -> str:
-        """The reason in a form that contains no numbers of this pair."""
+        """The reason, worded without the values of the particular pair."""
         return self.kind or self.reason
 
 
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
+)
+_CHECK_GIVEN_TIMES: Final = (
+    "make sure that no force acts in the flight that you gave, "
+    "or let the evidence decide, without `after` and `landing`"
 )
 _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
@@ -268,14 +275,14 @@ _UNKNOWN_LOAD: Final = Cause(
 
 
 class Grade(NamedTuple):
-    """A ``grade`` of `GRADES`, and the ``causes`` why it is not better; empty for "good"."""
+    """A ``grade`` from `GRADES`, and the ``causes`` that prevent a better grade; no causes for "good"."""
 
     grade: str
     causes: tuple[Cause, ...] = ()
 
     @classmethod
     def of(cls, poor: Sequence[Cause], fair: Sequence[Cause]) -> Grade:
-        """Make a grade: "poor" or "fair" if there are causes for this grade, else "good"."""
+        """Make a grade: "poor" or "fair" if there are causes for this grade, otherwise "good"."""
         if poor:
             return cls("poor", tuple(poor))
         return cls("fair", tuple(fair)) if fair else cls("good")
@@ -318,7 +325,7 @@ class Quality(NamedTuple):
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The causes that keep the grade from being better, with their cures."""
+        """The causes that prevent a better grade, with their cures."""
         statements = (self.motion, self.vibration)
         worst = [part.causes for part in statements if part.grade == self.grade]
         return tuple(chain.from_iterable(worst))
@@ -329,10 +336,21 @@ class Quality(NamedTuple):
         return tuple(cause.reason for cause in self.causes)
 
 
+def _explain_uncertain_flight(flight: Flight) -> Cause:
+    """Return why a flight is not certain: what contradicts the times given by the user, or a lack of evidence."""
+    if flight.source == "given" and flight.doubts:
+        return Cause(
+            flight.doubts[-1],
+            _CHECK_GIVEN_TIMES,
+            kind="the evidence contradicts the flight that was given",
+        )
+    return _NOT_CERTAIN
+
+
 def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade the recommended tr of a td: its motion, and its vibration, also in comparison with the next contact."""
+    """Grade a recommended tr by its motion, by its vibration error, and by that error relative to the next contact."""
     flight = situation.flight
-    uncertain = () if flight.certain else (_NOT_CERTAIN,)
+    uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
         *(Cause(fault, _CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
@@ -365,7 +383,7 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
 
 
 def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes why the vibration is graded "poor"."""
+    """Return the causes for which the vibration is graded "poor"."""
     causes = []
     if best.residual is None:
         causes.append(_describe_unknown_direction(situation))
@@ -384,6 +402,13 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     why = f": {refusal}" if refusal else ""
     unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
     cures = [*_ask_for_more_states(situation)]
+    if cures and _count_states(situation) < _FEW_STATES:
+        few = f"only {_count_states(situation)} states lie in the flight up to td"
+        return Cause(
+            f"{unknown}, because {few}",
+            cures[0].partition(", because")[0],
+            kind=unknown,
+        )
     for_modes = _describe_cure_for_modes(situation)
     if not cures or for_modes != _MORE_OFTEN:
         cures.append(for_modes)
@@ -395,7 +420,7 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
 
 
 def omit_comparison(quality: Quality) -> Quality:
-    """Return the grades without the advice to compare with a finished switched run, because this has been done."""
+    """Return the grades without the advice to compare with a finished switched run, since this has been done."""
 
     def omit(grade: Grade) -> Grade:
         causes = [
@@ -411,11 +436,21 @@ def omit_comparison(quality: Quality) -> Quality:
     )
 
 
+def _get_begin(situation: Situation) -> float:
+    """Return the start of the flight, or of the record if the start is unknown [time]."""
+    start = situation.flight.start
+    return float(situation.history.time[0]) if start is None else start
+
+
+def _count_states(situation: Situation) -> int:
+    """Return the number of states in the flight up to td."""
+    return int(situation.history.between(_get_begin(situation), situation.td)[0].size)
+
+
 def _ask_for_more_states(situation: Situation) -> Iterator[str]:
     """Yield a request for a shorter output interval if too few states lie in the flight up to td."""
-    start = situation.flight.start
-    begin = float(situation.history.time[0]) if start is None else start
-    states = situation.history.between(begin, situation.td)[0].size
+    begin = _get_begin(situation)
+    states = _count_states(situation)
     if states < _ENOUGH_STATES and situation.td > begin:
         interval = (situation.td - begin) / _ENOUGH_STATES
         yield (
@@ -425,7 +460,7 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
 
 
 def _describe_cure_for_modes(situation: Situation) -> str:
-    """Return the cure that would show the modes of the vibration: other parts, or more states."""
+    """Return the cure that would reveal the modes of the vibration: other parts, or more states."""
     if situation.history.parts is None:
         return "name the parts to be switched with `parts`, if the files contain parts"
     other_parts = situation.together.not_chosen.parts
@@ -437,7 +472,7 @@ def _describe_cure_for_modes(situation: Situation) -> str:
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
-    """Return the cause "the vibration after td is wrong", with its cure, which is another tr or td."""
+    """Return the cause "the vibration after td is wrong"; its cure is another tr or td."""
     reason = f"the vibration after td is wrong by {residual:.0%}"
     share = situation.kinetic_share
     if share is None or share <= POOR_KINETIC_SHARE:
@@ -459,7 +494,7 @@ def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:
 def _list_causes_of_record(
     history: History, start: float | None, td: float
 ) -> tuple[Cause, ...]:
-    """Return the causes why the states of the flight up to td do not show the energy level."""
+    """Return the reasons why the states of the flight up to td are insufficient to determine the energy level."""
     _, energy = history.between(-np.inf if start is None else start, td)
     causes = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
@@ -492,7 +527,7 @@ def rate_certainty_of_tr(best: Candidate) -> int:
 
 
 def _is_loose(best: Candidate) -> bool:
-    """Return True if the accuracy of tr is too poor for a good pair: the frozen-deformation error may be too large."""
+    """Return True if tr is not accurate enough for a good pair: the frozen-deformation error may be too large."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
@@ -501,7 +536,7 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes why the vibration is graded "fair"."""
+    """Return the causes for which the vibration is graded "fair"."""
     if best.residual is None:
         return []
     high = best.residual_high or best.residual
@@ -537,7 +572,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def count_states_per_period(energy: Samples) -> float | None:
-    """Return the average number of samples per energy period (two crossings of the mean); None if there is no period.
+    """Return the average number of states per energy period (two crossings of the mean); None if there is no period.
 
     Examples
     --------

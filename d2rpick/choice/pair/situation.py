@@ -45,14 +45,14 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Largest error of the energies that a solver writes, as a share of the highest energy [-].
+# Largest error of the energies that a solver writes, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# A fluctuation below this share of the largest vibration energy after the load is ignored [-].
+# Largest fluctuation treated as no vibration, as a fraction of the largest vibration energy after the load [-].
 _FAINT: Final = 1e-4
-# If an oscillator describes at least this share of the record, no modes are fitted [-].
+# Smallest fraction of the record that an oscillator must describe for no modes to be fitted [-].
 _MOST_OF_RECORD: Final = 0.5
-# Rounding error of a printed energy, in units of its last digit.
-# A constant energy may alternate between two printed values.
+# Rounding error of a printed energy, in units of its last digit [-].
+# Two units are assumed, because a constant energy may alternate between two printed values.
 _QUANTA: Final = 2
 
 
@@ -83,7 +83,7 @@ def is_at_rest(
 
 
 def _find_faint_fluctuation(history: History, start: float) -> float:
-    """Return the fluctuation of the energy up to which the flight is treated as free of vibration [energy].
+    """Return the largest energy fluctuation at which the flight is treated as free of vibration [energy].
 
     This limit is the largest of the solver error, the printed digits, and a small share of the energy that falls after
     the ``start`` of the flight [time].  At least the energy that falls was elastic, since plastic work stays.
@@ -102,7 +102,7 @@ def _find_highest_energy(history: History) -> float:
 
 
 class AnswerAtTd:
-    """Base class of all answers about a td, which ``situation`` describes."""
+    """Base class of all answers about the td that ``situation`` describes."""
 
     situation: Situation
 
@@ -147,7 +147,7 @@ class Situation:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """The vibration model at td that is reliable enough for the choice."""
+        """The most detailed vibration model at td that is reliable enough for the choice."""
         return model_at(self.whole, self.evidence)
 
     @cached_property
@@ -175,7 +175,7 @@ class Situation:
 
     @property
     def earliest_tr(self) -> float | None:
-        """Start of the flight plus the margin [time]; None if the start is unknown."""
+        """Earliest acceptable tr: start of the flight plus the margin [time]; None if the start is unknown."""
         start = self.flight.start
         if start is None:
             return None
@@ -183,13 +183,13 @@ class Situation:
 
     @property
     def latest_td(self) -> float:
-        """End of the flight minus the margin [time]; infinite if no contact was seen."""
+        """Latest acceptable td: end of the flight minus the margin [time]; infinite if the record shows no contact."""
         end = self.flight.end
         return float("inf") if end is None else sum_times_as_read(end, -self.margin)
 
     @cached_property
     def margin(self) -> float:
-        """Time kept free before the next contact [time]; 0 if the user gives td, but neither margin nor landing."""
+        """Time kept free before the next contact [time]; 0 if the user gives td but neither margin nor landing."""
         if self.settings.margin is None and self.settings.landing is not None:
             return self.expected_margin.time
         return self.settings.margin or 0.0
@@ -201,7 +201,7 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """The margin of a chosen td: the given margin, or the time by which the next contact may come earlier."""
+        """Margin for a td chosen by the program: the given margin, or how much earlier the contact may come."""
         return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
@@ -216,28 +216,28 @@ class Situation:
 
     @cached_property
     def bodies(self) -> Bodies | None:
-        """Drift in flight of the rigid bodies that the parts become; None if there are no part data."""
+        """Drift of the rigid bodies that the parts become in the flight; None if there are no part data."""
         return find_drift_of_bodies(self.history, self.flight, self.settings)
 
     def position_errors(self, times: Samples) -> Samples:
-        """Return the position error at td of a body frozen at each of ``times`` [length]; NaN if unknown."""
+        """Return the position error at td of a body that is frozen at each of ``times`` [length]; NaN if unknown."""
         if self.bodies is None:
             return np.broadcast_to(np.nan, times.shape)
         return self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
-        """Return the errors that the tolerance limits, in the shape of ``times`` [-]; 0 if nothing vibrates."""
+        """Return the errors to which the tolerance applies, in the shape of ``times`` [-]; 0 if nothing vibrates."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance; for many modes also the error of no vibration."""
+        """Largest error of an acceptable tr [-]: the tolerance or, for many modes, the limit of their model."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
     @property
     def in_flight(self) -> bool:
-        """True if td lies in a known flight and keeps the margin."""
+        """True if td lies in a known flight, at least the margin before its end."""
         return (
             self.earliest_tr is not None
             and self.earliest_tr < self.td <= self.latest_td
@@ -301,7 +301,7 @@ def examine_td(
     quiet: QuietTime | None = None
     is_given = settings.oscillator is not None or settings.fit_window is not None
     if not (is_shown or _covers_most(history, described) or (described and is_given)):
-        # The energy is the only evidence of a flight, or shows a longer flight than the oscillator.
+        # The quiet time is needed if the energy is the only evidence of a flight, or no fit covers most of the record.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -354,7 +354,7 @@ def _check_times(history: History, td: float, settings: Settings) -> None:
 
 
 def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
-    """Find the vibration models needed in addition to the oscillator."""
+    """Find the vibration models that are needed in addition to the oscillator."""
     flight = situation.flight
     if flight.start is None or not is_doubtful(situation.whole):
         return {}
@@ -367,7 +367,7 @@ def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
         # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window
 
-        # The energy shows a slightly different flight for each td, so modes are identified in windows that td share.
+        # The energy shows a slightly different flight for each td, so modes are fitted in windows that many td share.
         inner = get_inner_window(history, in_flight)
         in_flight = inner if inner.start < situation.td <= inner.end else in_flight
     return find_models(history, in_flight, settled, together=situation.together)
@@ -390,7 +390,7 @@ def make_look(
 
 
 def _limit_start(situation: Situation, since: float) -> Situation:
-    """Return the situation with a flight that begins at or after ``since`` [time]."""
+    """Return the situation with a flight that begins no earlier than ``since`` [time]."""
     flight = situation.flight
     if flight.start is None or flight.start >= since:
         return situation
@@ -398,14 +398,14 @@ def _limit_start(situation: Situation, since: float) -> Situation:
 
 
 def _get_bounds(history: History, seen: Seen) -> Span:
-    """Return the flight that the evidence shows, or else the whole record [time]."""
+    """Return the bounds of the flight according to the evidence, or else those of the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
     return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
-    """Return the window in which the energy shows no load, up to the end of the record if no contact is seen."""
+    """Return the window in which the energy shows no load, up to the end of the record if there is no contact."""
     if quiet is None:
         return None
     return Span(quiet.start, history.end if quiet.end is None else quiet.end)
@@ -422,7 +422,7 @@ def _covers_most(history: History, described: Described | None) -> bool:
 def _choose_longer_window(
     by_oscillator: Described | None, modes: ModalWindow | None
 ) -> Described | None:
-    """Return the window of an oscillator, or a longer one that modes describe; None if there is neither.
+    """Return the window that an oscillator describes, or a longer one that modes describe; None if there is neither.
 
     Modes follow a mean energy that drifts, so they describe long windows in which an oscillator soon misses it.  Only
     modes that leave hardly anything go over the end of an oscillator's window, for a contact may have ended it.

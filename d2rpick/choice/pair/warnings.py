@@ -36,28 +36,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# Smallest number of states per energy period with which faster modes are detected.
+# Smallest number of states per energy period at which modes of higher frequency can be detected.
 _FEW_STATES = 4
-# If the kinetic fraction at td exceeds this, every tr loses more than half of the vibration energy [-].
+# Kinetic fraction at td above which every tr loses more than half of the vibration energy [-].
 POOR_KINETIC_SHARE = 0.5
-# A pair with a larger residual is poor [-], because its error has more than 25 % of the vibration energy.
+# Largest residual of a pair that is not poor [-]; at this value, the error has 25 % of the vibration energy.
 POOR_RESIDUAL = 0.5
-# A warning is issued if the plastic energy, which may be a preload, exceeds this share of the vibration energy [-].
+# Largest plastic energy without a warning, as a fraction of the vibration energy [-]; it may be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Assumed static energy as a share of the lowest energy in flight [-], as many modes are never all at zero deformation.
+# Assumed ratio of the static to the lowest energy in flight [-], below 1 because modes rarely vanish at once.
 # With _AT_REST = 0.85, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
 # With _AT_REST = 0.85, the predicted mean energies of a shell box had errors of -0.05 to 0.16.
 _AT_REST = 0.85
-# Largest mean energy after td relative to the reference run [-], which may exceed 1 because the estimate is inexact.
-# Switching adds no energy, so a larger ratio shows that there is a contact in the flight.
+# Largest expected mean energy after td relative to the reference run [-]; 1 is exceeded, as estimates are inexact.
+# Switching adds no energy, so a ratio above MOST_KEPT indicates a contact in the flight.
 MOST_KEPT = 1.2
-# Largest argument for which the exponential function does not overflow.
+# Largest argument for which the exponential function does not overflow [-].
 _LARGEST_EXPONENT = 700.0
 
 
 def warn_about_td(situation: Situation) -> Iterator[Caution]:
-    """Yield all warnings about a situation, beginning with those about the input."""
+    """Yield all warnings about the td of a situation; warnings about the input come first."""
     if not situation.history.complete:
         end = float(situation.history.time[-1])
         yield Caution(
@@ -112,7 +112,7 @@ def _warn_about_energy(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_model(situation: Situation) -> Iterator[Caution]:
-    """Yield the warnings about the states, and about an estimated kinetic fraction."""
+    """Yield the warnings about the number of states, and about an estimated kinetic fraction."""
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
@@ -158,7 +158,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    # If there is a refusal, it already contains this message.
+    # If the situation has a refusal, the refusal already contains this message.
     elif td <= earliest and not flight.refusal:
         yield Caution(
             "td-in-load",
@@ -174,7 +174,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning, with the earliest contact time, if the body only grazes the contact that ends the flight."""
+    """Yield a warning with the earliest contact time, if the body only grazes in the contact that ends the flight."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.source != "grazing":
@@ -189,7 +189,7 @@ def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if the rotation of the body is unknown and may make the next contact earlier."""
+    """Yield a warning if the body's rotation is unknown and may cause an earlier contact."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.rotation is None:
@@ -204,7 +204,7 @@ def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
 
 
 def _describe_early_contact(situation: Situation) -> str:
-    """Describe how much earlier the contact may come, and the last td before that."""
+    """Describe how much earlier the contact may come, and the last safe td."""
     start, end = situation.flight.within(situation.history.time)
     early = min(situation.expected_margin.time, end - start)
     if early < end - start:
@@ -215,7 +215,7 @@ def _describe_early_contact(situation: Situation) -> str:
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning, with advice, if a flight is uncertain although more than the parts' energy shows the flight."""
+    """Yield a warning, with advice, if a flight is uncertain although other data than the part energies show it."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
@@ -240,7 +240,7 @@ def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
 
 
 def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
-    """Yield warnings if the position error at td is unknown or, due to a part frozen at ``tr``, too large."""
+    """Yield warnings if the position error at td is unknown, or too large because of a part frozen at ``tr``."""
     bodies = situation.bodies
     if bodies is None:
         return
@@ -282,7 +282,7 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe the parts that are not connected to the others and move away from them."""
+    """Describe the parts that move away from the others without being connected to them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -305,17 +305,17 @@ def _describe_not_predicted(
 
 
 def describe_end_of_load(situation: Situation) -> str:
-    """Describe ``earliest_tr``: the start of the flight, plus the margin if there is a margin."""
+    """Describe ``earliest_tr`` in words: the start of the flight, plus the margin if there is one."""
     return f"the end of the load at {situation.flight.start:.6g}{_describe_margin(situation.settings.margin)}"
 
 
 def describe_end_of_flight(situation: Situation) -> str:
-    """Describe ``latest_td``: the end of the flight, minus the margin if there is a margin."""
+    """Describe ``latest_td`` in words: the end of the flight, minus the margin if there is one."""
     return f"the end of the flight at {situation.flight.end:.6g}{_describe_margin(situation.margin)}"
 
 
 def _describe_margin(margin: float | None) -> str:
-    """Describe a margin; empty if there is no margin."""
+    """Describe a margin in words; empty if there is no margin."""
     return f" with the margin {margin:.6g}" if margin else ""
 
 
@@ -335,7 +335,7 @@ def _describe_nearest_flight(situation: Situation) -> str:
 
 
 class Expectation(NamedTuple):
-    r"""Estimates for a vibration with many modes; the fields are the keys of the JSON output.
+    r"""Estimates of the motion after td for a vibration with many modes; the fields are the keys of the JSON output.
 
     Such a vibration shares its energy equally between internal and kinetic energy.  The locked-in energy above the
     energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
@@ -384,12 +384,12 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td, relative to the reference run [-], if ``locked`` is locked in [energy]."""
+        """Return the mean energy after td relative to the reference run [-], if ``locked`` is locked in [energy]."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
     def largest_locked_in(self) -> float:
-        """Largest energy to lock in such that the energy after td does not exceed the reference run's [energy]."""
+        """Largest locked-in energy at which the energy after td does not exceed that of the reference run [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
@@ -410,7 +410,7 @@ def compute_means(situation: Situation) -> Means | None:
 
 
 def find_largest_energy(situation: Situation) -> float:
-    """Return the largest energy that may be locked in at a td [energy]; infinite if the energy does not limit it."""
+    """Return the largest energy that may be locked in for a td [energy]; infinite if the energy sets no limit."""
     means = compute_means(situation)
     return means.largest_locked_in if means else np.inf
 
@@ -418,7 +418,7 @@ def find_largest_energy(situation: Situation) -> float:
 def estimate_time_after(
     situation: Situation, energy_tr: float | None
 ) -> Expectation | None:
-    """Estimate the motion after td; None if the basis is not "energy", or if there is no flight or energy.
+    """Estimate the motion after td; None if the basis is not "energy", or if the flight or the energy is unknown.
 
     ``energy_tr`` is the energy that the recommended tr locks in [energy], None if there is no tr.
     """
@@ -443,7 +443,7 @@ def compute_mean_in_flight(situation: Situation) -> float | None:
 
 
 def compute_mean_decay(situation: Situation, time: Samples) -> float:
-    """Return the mean vibration energy at the times, relative to the energy at td [-], from the flight's damping."""
+    """Return the mean vibration energy at ``time`` relative to that at td [-], from the damping in the flight."""
     exponents = -situation.flight.damping * (time - situation.td)
     return float(np.mean(np.exp(np.minimum(exponents, _LARGEST_EXPONENT))))
 
@@ -458,7 +458,7 @@ def select_energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
 
 
 def compute_shortfall(energy: Samples, mean: float) -> Samples:
-    """Return by how much a locked-in amplitude falls short of the largest amplitude, 1 - sqrt(E/(2 <E>)) [-].
+    """Return the relative difference of a locked-in amplitude from the largest amplitude, 1 - sqrt(E/(2 <E>)) [-].
 
     The shortfall is infinite for larger energies, which must not be locked in.
 
@@ -473,7 +473,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection to the candidates for which ``holds`` (n,) is True.
+    """An objection to all candidates for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.
@@ -536,12 +536,18 @@ def list_objections(
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     limits = np.array([situation.most_error for situation in situations])[situation_of]
     too_much = judged & (error > limits)
-    yield Objection(too_much & ~modal, partial(_tell_error, error, limits))
+    for name, of_this_name in (
+        ("frozen-deformation error", compared),
+        ("level error", ~compared),
+    ):
+        yield Objection(
+            too_much & ~modal & of_this_name, partial(_tell_error, name, error, limits)
+        )
     yield Objection(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
     )
-    # For a td after the end of the flight, the energy in the flight does not predict the motion after td.
+    # If td lies after the end of the flight, the energy in the flight does not predict the motion after td.
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
@@ -570,7 +576,7 @@ def _get_first_tr(situation: Situation) -> float:
 
 
 def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
-    """Return which of the times of a pair lie outside the flight, or less than the margin before its end."""
+    """Return descriptions of the times of a pair that lie outside the flight or less than the margin before its end."""
     outside = []
     if tr < _get_first_tr(situation):
         outside.append(f"tr {_describe_in_load(situation)}")
@@ -582,7 +588,7 @@ def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
 def _tell_in_load(
     situations: Sequence[Situation], situation_of: NDArray[np.int32], candidate: int
 ) -> list[str]:
-    """Return the objection that a candidate lies before the flight."""
+    """Return the objection that a candidate for tr lies before the flight."""
     return [_describe_in_load(situations[situation_of[candidate]])]
 
 
@@ -605,11 +611,13 @@ def _tell_always(reason: str, _: int) -> list[str]:
     return [reason]
 
 
-def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
+def _tell_error(
+    name: str, error: Samples, limits: Samples, candidate: int
+) -> list[str]:
     """Return the objection that the error of a candidate exceeds the tolerance."""
     limit = limits[candidate]
     return [
-        f"error {format_beyond_limit(error[candidate], limit)} above the tolerance {limit:g}"
+        f"{name} {format_beyond_limit(error[candidate], limit)}, above the tolerance {limit:g}"
     ]
 
 
@@ -619,7 +627,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate is worse than a run that does not vibrate after td."""
+    """Return the objection that a candidate is worse than having no vibration after td."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -638,14 +646,14 @@ def _tell_above_the_reference(
 
 
 def _describe_in_load(situation: Situation) -> str:
-    """Describe that a tr lies before the flight, or that no flight is known."""
+    """State that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: no end of the load is found"
     return f"before {describe_end_of_load(situation)}"
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that a pair is worse than no vibration after td, or than the best pair at this td."""
+    """State that a pair is worse than having no vibration after td, or than the best pair at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
@@ -654,7 +662,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """Describe by which factor the mean energy after td would exceed that of the reference run."""
+    """State the factor by which the mean energy after td would exceed that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"

@@ -1,4 +1,4 @@
-"""Find the windows of time in which a tr is acceptable, for one run and for many."""
+"""Find the time windows of acceptable tr, for one run and for many."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-    # Function that tests times, and returns True for each time that passes the test.
+    # A function that tests times, and returns True for each time that passes the test.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of bisections that locate the end of a window with an accuracy of 1e-6 of the sampling interval.
+# Number of bisections that locate the end of a window to within 1e-6 of the sampling interval.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
-# Largest deviation of the error from its polyline [-], which is half of the last printed digit.
+# Largest deviation of the error from its polyline [-]; this is half a unit of the last printed digit.
 _EXACT: Final = 5e-4
-# An interval in which the error is curved is halved at most this number of times.
+# Largest number of halvings of an interval in which the error curve is not straight.
 _HALVINGS: Final = 20
 
 
 def find_acceptable_windows(
     situation: Situation, candidates: Candidates, recommended: float | None
 ) -> Samples:
-    """Find the windows in which a tr is acceptable.
+    """Find the time windows of acceptable tr.
 
     The rule of ``verify`` is applied to both ends and the middle of each window; the ends are acceptable too.  Between
     them the verdict cannot change, because between neighbouring grid points the energy is linear or the deformation
@@ -85,7 +85,7 @@ def cut_before_td(situation: Situation, windows: Samples) -> Samples:
 def find_alike_windows(
     situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
 ) -> Samples:
-    """Find the acceptable windows in which the error of a tr is at most 0.05 larger than at the chosen tr.
+    """Find the acceptable windows in which the error of a tr exceeds that of the chosen tr by at most 0.05.
 
     The timing tolerance of a candidate is the time by which it may be off before its frozen-deformation error grows by
     0.05.  On the energy alone the level error replaces that error.
@@ -119,7 +119,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count the runs that have a time in one of their windows.
+    """Count, for each time, the runs that have the time in one of their windows.
 
     Parameters
     ----------
@@ -141,11 +141,11 @@ def count_coverage(
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    # At equal times, starts are sorted before ends, since windows include their ends.
+    # At equal times, starts are sorted before ends, because windows include their ends.
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # Windows that start, or end, at the same time have no gap between them.
+    # Windows have no gap between them if one starts at the time at which another ends.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching
@@ -166,14 +166,14 @@ def find_common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Return times in the flight before td; between two of them the verdict changes at most once [time]."""
+    """Return times in the flight before td; the verdict on tr changes at most once between two of them [time]."""
     history = situation.history
     td = situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    # Crossings just below the largest acceptable energy are added, because the energy may exceed it between samples.
+    # Times at which the energy is just below its limit are included, because it may exceed the limit between samples.
     highest_crossings = find_crossings(
         history.time, history.energy, (1 - _BELOW) * find_largest_energy(situation)
     )[0]
@@ -190,7 +190,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times: neither the error exceeds ``level``, nor the energy its limit."""
+    """Return a test of times for tr: the error is at most ``level``, and the energy is at most its limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
@@ -202,12 +202,12 @@ def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
 
 
 def _make_rule(situation: Situation) -> Keeps:
-    """Return a test of times that requires an acceptable error and all limits of the settings."""
+    """Return a test of times for tr that requires an acceptable error and all limits of the settings."""
     has_small_error = _make_limit_on_error(situation, situation.most_error)
     has_limits = any(True for _ in situation.settings.limits)
 
     def keeps_rule(times: Samples) -> NDArray[np.bool_]:
-        # If nothing vibrates, any tr before td is acceptable unless td itself is wrong.
+        # If nothing vibrates, any tr before td is acceptable unless td itself is not.
         keeps = (
             np.ones(times.shape, np.bool_)
             if situation.at_rest
@@ -221,7 +221,7 @@ def _make_rule(situation: Situation) -> Keeps:
 
 
 def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
-    """Return the windows in which times pass a test, shape (n, 2) [time]."""
+    """Return the windows in which the times of a grid pass a test, shape (n, 2) [time]."""
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])
@@ -237,7 +237,7 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
 def make_error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Return the error of a tr in windows as the points of a polyline, accurate to 0.0005.
+    """Return the error of tr in the windows as the points of a polyline that is accurate to 0.0005.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def make_error_profile(
 
 
 def interpolate_error(profile: Samples, time: float) -> float:
-    """Return the error at a time in one of the windows of a profile [-]."""
+    """Return the error at a time in one of the windows of an error profile [-]."""
     return float(np.interp(time, *profile))
 
 
@@ -286,13 +286,13 @@ def _compute_errors(situation: Situation, times: Samples) -> Samples:
 
 
 def _is_inside(times: Samples, windows: Samples) -> Samples:
-    """Return an array that is True for times in a window."""
+    """Return an array that is True for each time in one of the windows."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
-    """Thin out a curve by keeping the ends of windows and, between them, the points farthest from straight lines."""
+    """Thin out a curve: keep the ends of windows and, between them, the points farthest from straight lines."""
     points = np.flatnonzero(np.isin(times, windows))
     while True:
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))

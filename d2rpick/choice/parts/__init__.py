@@ -1,1 +1,1 @@
-"""Choose the parts to switch: their costs, which may be switched, which sets to compare, and their margins."""
+"""Choose the parts to switch: find which parts may be switched, what they cost, and which sets of parts to compare."""

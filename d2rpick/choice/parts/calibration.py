@@ -1,4 +1,4 @@
-"""Fit the weights of a site to the CPU times of its own runs.
+"""Fit the cost weights of a site to the CPU times of its own runs.
 
 A leg of a run is an engine run of Radioss or a restart segment of LS-DYNA.  For each leg, with its computed elements,
 cycles and CPU time,
@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Relative error of CPU times (5 %) divided by the relative error of the assumed ratios of weights (50 %) [-].
+# Relative error of CPU times (5 %) divided by the relative error of the assumed weight ratios (50 %) [-].
 _DOUBT: Final = 0.1
-# The restart segments determine a weight if they contribute more than this share to its value [-].
+# Smallest contribution of the restart segments to a weight at which they determine the weight [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -76,7 +76,7 @@ class Observation(NamedTuple):
 
 @dataclass(frozen=True)
 class FittedWeights:
-    """The fitted weights, and for each weight the number of restart segments that determine it.
+    """The fitted weights, and the number of restart segments that determine each weight.
 
     ``told`` lists the classes that the legs determine, ``misfit`` is the relative misfit [-].
     """
@@ -89,7 +89,7 @@ class FittedWeights:
 
 
 def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
-    """Fit weights to the CPU times of restart segments, in some of which parts are rigid.
+    """Fit weights to the CPU times of restart segments; parts are rigid in some of the segments.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
 def _make_start_values(
     deformable: Sequence[Observation], classes: Sequence[str]
 ) -> Samples:
-    """Return start values: weights in the unit of these runs, remaining cost per node, cost per rigid-body node."""
+    """Return start values: weights scaled to these runs, remaining cost per node, and cost per rigid-body node."""
     measured = [
         sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
         for observation in deformable
@@ -159,7 +159,7 @@ def _make_start_values(
 def _build_equations(
     observations: Sequence[Observation], classes: Sequence[str]
 ) -> tuple[Samples, Samples]:
-    """Return the matrix and the right-hand side of the equations of all restart segments."""
+    """Return the matrix and the right-hand side of the equations for all restart segments."""
     rows, right_side = [], []
     for observation in observations:
         counts = [observation.counts.get(name, 0.0) for name in classes]
@@ -172,7 +172,7 @@ def _build_equations(
 
 
 def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Solve non-negative least squares; return all unknowns, and which of them the rows determine.
+    """Solve the non-negative least-squares problem; return all unknowns, and which of them the rows determine.
 
     Undetermined unknowns stay 1.
     """
@@ -193,7 +193,7 @@ def _solve_equations(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
 def _compute_element_share(
     observation: Observation, values: Mapping[str, float]
 ) -> float:
-    """Return the share of the elements in the CPU time of a step [-]."""
+    """Return the fraction of the CPU time of a step that is due to elements [-]."""
     spent = sum(
         values.get(name, 0.0) * count for name, count in observation.counts.items()
     )
@@ -212,7 +212,7 @@ class _RigidPart(NamedTuple):
 def read_observations_of_runs(
     folders: Sequence[str],
 ) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
-    """Read the CPU times of the restart segments of several runs; files of equal content are used once.
+    """Read the CPU times of the restart segments of several runs; files with equal content are used once.
 
     Raises
     ------
@@ -348,7 +348,7 @@ def _read_termination_time(deck: Deck) -> float:
 def _make_observation(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Return the observation of a restart segment; each part was rigid in it for a fraction ``lasting`` of the time."""
+    """Return the observation of a restart segment, in which each part was rigid for its fraction ``lasting`` [-]."""
     counts, nodes = _count_computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
@@ -385,7 +385,7 @@ def _make_zone_observations(
 def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Return the average numbers of deformable elements and further points by class, and of rigid-body nodes."""
+    """Return the average numbers of deformable elements and integration points by class, and of rigid-body nodes."""
     always = {
         part
         for part, data in inventory.parts.items()
@@ -422,7 +422,7 @@ def _add_counts(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add the numbers of elements of known cost, multiplied by the factor ``times``, to the counts by class."""
+    """Add the numbers of elements of known cost to the counts by class, multiplied by the factor ``times``."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

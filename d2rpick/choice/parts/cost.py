@@ -1,7 +1,7 @@
-"""Model the cost of a time step, and the share of this cost that is saved while selected parts are rigid.
+"""Model the cost of a time step, and the fraction of this cost that is saved while selected parts are rigid.
 
 A step costs C = E / s.  E is the sum of weight x number over the computed elements, by formulation, and over their
-integration points through the thickness. s is the share of the elements in the cost of a step; assembly, contact and
+integration points through the thickness. s is the fraction of the elements in the cost of a step; assembly, contact and
 output take the rest.  While parts are one rigid body their elements cost nothing, and each of its n nodes costs r, so
 the saved share is
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import SourceFile
 
 # Cost of an element per cycle [us]; a shell costs "point" more for each integration point after the first.
-# The costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
-# The costs of beams and springs are less accurate than the other costs.
+# The element costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
+# The costs of beams and springs are less accurate than the costs of other elements.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Share of the elements in the cost of a deformable step [-], including their assembly, contact and output.
+# Fraction of the cost of a deformable step that is due to elements, with their assembly, contact and output [-].
 ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs as the element costs.
 RIGID_NODE: Final = 0.04
@@ -42,14 +42,14 @@ _SOURCE: Final = "OpenRadioss 2026-08, one thread"
 # Upper limit of a cost, so that sums over all elements stay finite. Real costs are far smaller in any unit.
 _LARGEST: Final = 1e100
 
-# Keys with a number in the TOML file of weights that ``d2rpick calibrate`` writes.
+# Keys with a numerical value in the TOML file of weights that ``d2rpick calibrate`` writes.
 _NUMBERS: Final = ("element_share", "rigid_node")
 _KEYS: Final = (*_NUMBERS, "per_element", "source")
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Cost of an element per cycle by formulation or class, cost of a rigid-body node, and share of elements in a step.
+    """Cost per element and cycle by formulation or class, cost per rigid-body node, and element fraction of step cost.
 
     Only ratios count: all costs have the unit of ``per_element``.  ``file`` is the file that the weights were read
     from, None if they were not read.
@@ -62,7 +62,7 @@ class Weights:
     file: Source | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise ConfigurationError if a number is outside of its range."""
+        """Raise ConfigurationError if a number is outside its range."""
         for name, value in self.per_element.items():
             _check_weight(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
@@ -87,7 +87,7 @@ def _check_weight(name: str, value: float) -> None:
 def compute_saved_share(
     weights: Weights, total: float, rigid: float, nodes: int
 ) -> float:
-    """Return the share of a step's cost that is saved while elements with a total cost of ``rigid`` are rigid [-].
+    """Return the fraction of a step's cost that is saved while elements of total cost ``rigid`` are rigid [-].
 
     Parameters
     ----------
@@ -110,28 +110,28 @@ def compute_saved_share(
 
 
 class Amount(NamedTuple):
-    """Cost of a set of elements in the unit of the weights, and the formulations in it that have no weight."""
+    """Cost of a set of elements in the unit of the weights, and the formulations among them that have no weight."""
 
     cost: float
     unknown: tuple[str, ...] = ()
 
 
 class Share(NamedTuple):
-    """Share of a step's cost that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
+    """Fraction of a step's cost that is saved while the parts are rigid [-]; None with the reason if it is unknown."""
 
     value: float | None
     reason: str | None = None
 
 
 class ByDeck(NamedTuple):
-    """Sources of the values from a deck: its files, and the weights (None if the cost share was given)."""
+    """Sources of values from a deck: its files, and the weights (None if the user gave the cost fraction)."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
 
 
 class CostModel:
-    """Model of the cost of a deck's elements. Elements that are rigid from the start cost nothing."""
+    """Cost model for the elements of a deck. Elements that are rigid from the start cost nothing."""
 
     def __init__(self, inventory: Inventory, weights: Weights | None = None) -> None:
         self.inventory = inventory
@@ -148,11 +148,11 @@ class CostModel:
 
     @cached_property
     def total(self) -> Amount:
-        """Cost of all elements."""
+        """Cost of all elements of the deck."""
         return _sum_amounts(self.of_part(part) for part in self.inventory.counts)
 
     def share_of(self, part: int) -> Share:
-        """Return the share of a part's elements in the cost of all elements [-]."""
+        """Return the cost of a part's elements as a fraction of the cost of all elements [-]."""
         cost_of_part = self.of_part(part)
         total = self.total
         return self._share(
@@ -160,7 +160,7 @@ class CostModel:
         )
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Return the share of a step's cost saved while ``parts`` are rigid [-]; unknown if the deck lacks a part."""
+        """Return the step-cost fraction saved while ``parts`` are rigid [-]; unknown if the deck lacks one of them."""
         absent = sorted(set(parts) - self.inventory.parts.keys())
         if absent:
             return Share(
@@ -178,7 +178,7 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """The formulations of the deck for which the weight of a similar formulation is assumed."""
+        """Formulations in the deck that have no weight, for which the weight of a similar formulation is assumed."""
         names: dict[str, None] = {}
         for part, counts in self.inventory.counts.items():
             if part in self._rigid:
@@ -212,7 +212,7 @@ class CostModel:
         return Amount(cost, tuple(unknown))
 
     def _share(self, amount: Amount, value: float) -> Share:
-        """Return ``value``, a share of the computing cost, if all elements have weights; else None with the reason."""
+        """Return ``value``, a fraction of the cost, if all elements have weights; otherwise None with the reason."""
         if not self.inventory.counts:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
@@ -239,7 +239,7 @@ def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
 
 
 def read_weights(path: str) -> Weights:
-    """Read weights from a TOML file. A missing element share or node cost gets its measured value.
+    """Read weights from a TOML file. A missing element fraction or node cost gets its default.
 
     Raises
     ------
@@ -322,6 +322,6 @@ def _parse_weight(path: str, name: str, value: object) -> float:
         raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
     try:
         return float(value)
-    # The integer has hundreds of digits, which a float cannot hold.
+    # The integer has hundreds of digits, too many for a float.
     except OverflowError:
         return float("inf")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def find_rigid_bodies(
     inventory: Inventory, parts: Collection[int]
 ) -> tuple[RigidBody, ...]:
-    """Return the rigid bodies that ``parts`` become; empty if elements, or ties between bodies, are unknown.
+    """Return the rigid bodies that ``parts`` become; empty if their elements, or ties between bodies, are unknown.
 
     In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
     bodies are sets of nodes, each piece may have a body of its own.
@@ -45,7 +45,7 @@ def find_rigid_bodies(
 
 
 def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
-    """Return True if a rigid body is one connected piece, or Radioss can treat its pieces separately."""
+    """Return True if a rigid body is connected, or if Radioss can treat its disconnected pieces as separate bodies."""
     alone = len(body) == 1 and inventory.solver == "radioss"
     return (
         alone
@@ -57,14 +57,14 @@ def _is_whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
 def merge_into_one_body(
     parts: Collection[int], bodies: Iterable[RigidBody]
 ) -> RigidBody:
-    """Return the single rigid body of merged parts, regardless of the ``bodies`` they would become."""
+    """Return the single rigid body of merged parts, whatever ``bodies`` they would otherwise become."""
     # A single part is one connected body only if it has no disconnected pieces.
     whole = len(parts) > 1 or any(body.whole for body in bodies)
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
 def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
-    """Return a warning if a deck does not belong to a run, otherwise None.
+    """Return a warning if a deck does not match the model of a run, otherwise None.
 
     A deck does not belong to a run if most titles of their common parts differ, or if the deck was read completely and
     lacks parts that have energy.
@@ -100,7 +100,7 @@ def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
 
 
 def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if parts have other titles in the deck than in the history."""
+    """Yield a warning if the titles of parts differ between deck and history."""
     differing = [
         part
         for part in parts
@@ -117,7 +117,7 @@ def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[C
 def warn_about_bodies(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings if ties that were not read may join the bodies of ``parts``, or a body has loose pieces."""
+    """Yield warnings if ties that were not read may join the bodies of ``parts``, or if a body is disconnected."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
         if len(inventory.ties) > 1:
             more_ties = f" and {len(inventory.ties) - 1} more ties"
@@ -145,7 +145,7 @@ def warn_about_bodies(
 def warn_about_solver(
     parts: Collection[int], inventory: Inventory
 ) -> Iterator[Caution]:
-    """Yield warnings about deck features that ruin a run, unknown supports, and stresses that do not rotate."""
+    """Yield warnings about deck features that ruin a run, unknown supports, and stresses without objective update."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
@@ -206,7 +206,7 @@ def _get_title_in_deck(part: Part, inventory: Inventory) -> str:
 
 
 def _is_different_title(first_title: str, second_title: str) -> bool:
-    """Return True if two titles differ, ignoring spaces and case; one of them may be truncated.
+    """Return True if two titles differ, ignoring spaces and case; one of the titles may be truncated.
 
     Letters beyond ASCII are not compared, since the files of one run encode them in different ways.
     """
@@ -221,7 +221,7 @@ def _is_different_title(first_title: str, second_title: str) -> bool:
 def add_deck_to_settings(
     settings: Settings, reference: Reference, model: CostModel
 ) -> tuple[Settings, tuple[Caution, ...]]:
-    """Return settings with the cost share and the rigid bodies that the deck defines for the parts of a history.
+    """Return settings with the cost fraction and the rigid bodies that the deck defines for the parts of a history.
 
     A given cost share is kept.  Warnings list what stays unknown; a deck of another model is not used.
     """
@@ -247,7 +247,7 @@ def add_deck_to_settings(
             open_ = [Caution("cost-unknown", f"the CPU time is not estimated: {why}")]
         else:
             open_ = []
-        # Parts in a missing include file cannot be named.
+        # Parts defined in a missing include file cannot be named.
         unread = warn_about_cost(model, used=False)
         return replace(settings, bodies=()), (*doubts_of_parts, *unread, *open_)
     is_computed = settings.cost_share is None
@@ -273,7 +273,7 @@ def add_deck_to_settings(
 
 
 def add_surroundings(run: OpenedRun, inventory: Inventory | None) -> OpenedRun:
-    """Return a run with the surroundings that its deck defines; unchanged if there is no deck of the model."""
+    """Return the run with the gravity, supports and connections in its deck; unchanged if it has no matching deck."""
     if inventory is None or check_model_of_deck(run, inventory):
         return run
     return run.within(_find_surroundings(inventory))
@@ -298,20 +298,20 @@ def _find_surroundings(inventory: Inventory) -> Surroundings:
 
 
 def _group_connected_parts(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
-    """Return the groups of connected parts; empty if parts may be missing, or ties may join the groups."""
+    """Return the groups of connected parts; empty if parts may be missing, or if ties may join the groups."""
     is_complete = inventory.complete and not inventory.ties
     return inventory.bodies(inventory.nodes_by_part.keys()) if is_complete else ()
 
 
 def _make_supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
-    """Return the supports with their names and times; each support occurs once."""
+    """Return the supports with their names and times, without duplicates."""
     return tuple(
         dict.fromkeys(Support(hold.name, hold.start, hold.end) for hold in holds)
     )
 
 
 def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield each part with known gravity, and the accelerations that gravity may have for it."""
+    """Yield each part with known gravity, and the possible accelerations of gravity on it."""
     loads = inventory.boundary.gravity
     for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
         acting = [(load, _is_gravity_on(load, part, nodes)) for load in loads or ()]
@@ -322,7 +322,7 @@ def _find_gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]
 
 
 def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
-    """Return True if gravity acts on a part with these nodes; None if it acts on some nodes only."""
+    """Return True if gravity acts on a part with these nodes; None if it acts on only some of the nodes."""
     if load.nodes is None or part in load.parts:
         return True
     inside = np.isin(nodes, load.nodes)
@@ -330,7 +330,7 @@ def _is_gravity_on(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 
 
 def _sum_gravity(loads: list[Gravity]) -> tuple[float, ...] | None:
-    """Return the possible values of the sum of several gravity loads; None if the sum is unknown."""
+    """Return the possible sums of several gravity loads [length/time^2]; None if the sum is unknown."""
     if len(loads) < 2:
         values = loads[0].values if loads else ()
         return tuple(sorted({abs(value) for value in values} or {0.0}))

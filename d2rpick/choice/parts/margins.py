@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.position_error import Bodies, RigidBody
     from d2rpick.histories.history import History
 
-# Number of times in a flight at which making a body rigid is tried; few suffice, because internal motion is slow.
+# Number of times in a flight at which a body is made rigid as a trial; few suffice, because internal motion is slow.
 _TIMES: Final = 100
 
 
 def find_drift_of_bodies(
     history: History, flight: Flight, settings: Settings
 ) -> Bodies | None:
-    """Return the drift of the rigid bodies of the parts in a flight; None if there are no data of parts."""
+    """Return the drift of the rigid bodies of the parts in a flight; None if there are no part data."""
     history, flight = restore_parts(history, flight)
     if flight.parts is None:
         return None
@@ -42,7 +42,7 @@ def _compute_drift(
     rigid_bodies: tuple[RigidBody, ...] | None,
     placement: Placement | None,
 ) -> Bodies:
-    """Return the drift of the rigid bodies of the parts in a flight."""
+    """Compute the drift of the rigid bodies of the parts in a flight."""
     # Imported here to keep start-up fast.
     from d2rpick.flight.position_error import (
         find_bodies_in_flight,
@@ -86,7 +86,7 @@ def _judge_rotation(
 def compute_turning_speed(
     history: History, flight: Flight, bodies: Bodies, placement: Placement | None
 ) -> float | None:
-    """Return the speed that the rotation of the bodies adds at the points where they touch a contact [length/time].
+    """Return the speed that the bodies' rotation adds at the points of contact [length/time]; None if it is unknown.
 
     If the deck gives the places of the parts but nothing shows how the bodies turn, it is the least speed that the
     kinetic energy allows.  None if there is no deck, or if the momenta do not show a direction.

@@ -1,4 +1,4 @@
-"""Compare sets of parts: the saving and the position error of each, and which set to make rigid."""
+"""Compare sets of parts: the saving and the position error of each set, and which set to make rigid."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from d2rpick.base.errors import (
 )
 from d2rpick.choice.answers import suggest_in_run, verify_run
 from d2rpick.choice.pair.candidates import ONE_BODY
+from d2rpick.choice.pair.grades import POOR
 from d2rpick.choice.pair.warnings import warn_about_place
 from d2rpick.choice.parts.deck_of_run import (
     add_surroundings,
@@ -53,9 +54,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Savings that differ by less than this are treated as equal [-]; the cost model has errors of a few percent.
+# Largest difference of savings that are treated as equal [-]; the cost model has errors of a few percent.
 _LIKE: Final = 0.01
-# The set "heavy" has at least this share of the mass of all switchable parts [-].
+# Smallest fraction of the mass of all switchable parts that the set "heavy" contains [-].
 _HEAVY: Final = 0.5
 _ALL, _STILL = "all that may", "all but what moves"
 _NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotates, so the rotation error is unknown"
@@ -64,7 +65,7 @@ _NO_ANGLE: Final = "the part momenta do not show how a body of these parts rotat
 class PartSet(NamedTuple):
     """A set of parts with its saving and its errors; unknown values are None, with the cause in ``reasons``.
 
-    ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the share of a step that they save [-].
+    ``bodies`` are the rigid bodies that the parts become, ``cost_share`` is the fraction of a step that they save [-].
     `step_growth` is the factor by which the time step may grow meanwhile [-], infinite if no deformable part limits
     it; predictions use the factor of the settings.  ``window`` is (tr, td) in the longest flight [time],
     ``rigid_fraction`` its share of the record [-].  ``angle_error`` is the rotation error of a body at td [degrees]; it
@@ -99,12 +100,17 @@ class PartSet(NamedTuple):
 
     @property
     def saving(self) -> float | None:
-        """Share of the run time that is saved [-]; None if it is unknown."""
+        """Fraction of the run time that is saved [-]; None if it is unknown."""
         return None if self.run_time_share is None else 1 - self.run_time_share
 
     @property
+    def is_usable(self) -> bool:
+        """True if the pair of the set is not poor."""
+        return self.decision is None or self.decision.grade != POOR
+
+    @property
     def out_of_place(self) -> bool:
-        """True if the position error exceeds its limit, or a part separates from its body."""
+        """True if the position error exceeds its limit, or if a part separates from its body."""
         error = self.position_error
         limit = self.position_limit
         return self.apart or (error is not None and limit is not None and error > limit)
@@ -182,7 +188,7 @@ def compare_sets_of_parts(
             )
         else:
             still_parts = ()
-        # Parts that stay at rest relative to the body may fly longer than parts that move relative to it.
+        # Parts that are at rest relative to the body may fly longer than parts that move relative to it.
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
     recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))
@@ -197,7 +203,7 @@ def compare_sets_of_parts(
 
 
 def find_given_parts(run: OpenedRun, names: Sequence[str]) -> tuple[int, ...]:
-    """Return the part ids of a further set to compare.
+    """Return the part ids of an additional set to compare.
 
     Raises
     ------
@@ -244,7 +250,7 @@ def recommend_parts(
 
 
 def _drop_repeated_sets(sets: Sequence[PartSet]) -> list[PartSet]:
-    """Omit each set that has the same parts as an earlier set under another name."""
+    """Drop each set that has the same parts as an earlier set with another name."""
     return [
         part_set
         for at, part_set in enumerate(sets)
@@ -322,7 +328,7 @@ class _SetComparison:
     def _with_cost(
         self, part_set: PartSet, inventory: Inventory, share: Share
     ) -> PartSet:
-        """Add the rigid bodies, the costs, and the growth of the time step."""
+        """Add the rigid bodies, the costs, and the growth of the time step to a set of parts."""
         rigid_elements = {
             part: counts.total()
             for part, counts in inventory.elements_within(part_set.parts).items()
@@ -344,7 +350,7 @@ class _SetComparison:
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
-        """Return the share of the parts in the mass of all flying parts [-]; None if a mass is unknown."""
+        """Return the mass of the parts as a fraction of the mass of all flying parts [-]; None if a mass is unknown."""
         masses = {
             row.id: row.mass for row in self.rows if row.flight and row.flight.flies
         }
@@ -358,7 +364,7 @@ class _SetComparison:
         return sum(known_masses[part] for part in parts) / sum(known_masses.values())
 
     def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
-        """Return the parts outside of the heaviest rigid body; empty if ties may join the bodies."""
+        """Return the parts outside the heaviest rigid body; empty if ties may join the bodies."""
         masses = {row.id: row.mass or 0.0 for row in self.rows}
         main = max(
             inventory.bodies(parts),
@@ -368,7 +374,7 @@ class _SetComparison:
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Add the window in which the set may be rigid.
+        """Add the window in which the parts of a set may be rigid.
 
         Raises
         ------
@@ -405,7 +411,7 @@ class _SetComparison:
 
 
 def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> PartSet:
-    """Add the largest position error at td among the bodies whose parts move relative to each other."""
+    """Add the largest position error at td of the bodies whose parts move relative to each other."""
     codes = ("several-bodies", "moves-apart")
     reasons = tuple(
         caution.message
@@ -435,16 +441,17 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
 
 
 def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
-    """Mark the recommended set, which has the largest saving or, if several sets save as much, the fewest parts.
+    """Mark the recommended set: the one with the largest saving or, among equal savings, with the fewest parts.
 
-    A set with too large a position error is considered only if all sets have one.
+    A set with a poor pair, or with too large a position error, is considered only if all sets have one.
     """
     useful = [
         part_set
         for part_set in sets
         if part_set.saving is not None and part_set.saving > 0
     ]
-    in_place = [part_set for part_set in useful if not part_set.out_of_place] or useful
+    usable = [part_set for part_set in useful if part_set.is_usable] or useful
+    in_place = [part_set for part_set in usable if not part_set.out_of_place] or usable
     largest = max((part_set.saving or 0.0 for part_set in in_place), default=0.0)
     alike = [
         part_set for part_set in in_place if (part_set.saving or 0.0) >= largest - _LIKE

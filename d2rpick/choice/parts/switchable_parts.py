@@ -1,4 +1,4 @@
-"""Judge which parts may be switched, with reasons, from the data of deck and history."""
+"""Judge which parts may be switched, with reasons, from the data in deck and history."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# A part has stopped deforming if the standard deviation of its energy in flight is below this share of the mean [-].
+# Largest standard deviation of the energy in flight of a part that no longer deforms, relative to the mean [-].
 STOPPED: Final = 0.1
-# Duration of the first phase of a landing, as a share of the flight before it [-].
+# Duration of the first phase of a landing, as a fraction of the preceding flight [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# LANDING_ALONE: a bumper or skid absorbs at least this share of the energy at the start of the landing [-].
-# _CHEAP: a bumper or skid that stays deformable has at most this share of the cost of all elements [-].
+# LANDING_ALONE: smallest fraction of the energy at the start of the landing that a bumper or skid absorbs [-].
+# _CHEAP: largest fraction of the cost of all elements that a bumper or skid may have to stay deformable [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
 
 class InFlight(NamedTuple):
-    """Data of one part in one flight; energies are None if they are not written or the part has none.
+    """Data of one part in one flight; energies are None if they are not written or if the part has none.
 
     ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` is its value at the end
     minus that at the start [energy].  ``landing`` is the energy that the part takes up at the start of the landing.
@@ -56,7 +56,7 @@ class InFlight(NamedTuple):
 
     @property
     def deforms(self) -> bool | None:
-        """True if the part still deforms; None if its energy is unknown."""
+        """True if the part still deforms in the flight; None if its energy is unknown."""
         return None if self.scatter is None else self.scatter >= STOPPED
 
 
@@ -110,7 +110,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # The error is raised if no part ever deforms.
+    except FormatError as error:  # The error means that no part ever deforms.
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -152,7 +152,7 @@ def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | No
 def _is_flying(
     part: Part, flight: Flight, members: Sequence[Part] | None
 ) -> bool | None:
-    """Return True if a part flies with the others; None if no part momenta show it."""
+    """Return True if a part flies together with the others; None if no part momenta show it."""
     if members is None:
         return None
     together = flight.parts if flight.source == "momentum" and flight.parts else members
@@ -162,7 +162,7 @@ def _is_flying(
 def _measure_in_flight(
     time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
 ) -> InFlight:
-    """Return the mean, change and standard deviation of a part's energy in flight, and its energy in the landing."""
+    """Return mean, change and standard deviation of a part's energy in flight, and its energy in the landing."""
     inside = energy[find_window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)
@@ -180,7 +180,7 @@ def _measure_in_flight(
 def _measure_landing(
     time: Samples, energy: Samples, span: tuple[float, float]
 ) -> float | None:
-    """Return the energy that a part absorbs at the start of the landing [energy]; None if the record ends before."""
+    """Return the energy that a part absorbs at the start of the landing [energy]; None if the record ends earlier."""
     start, end = span
     energies = energy[find_window(time, end, end + _LANDING * (end - start))]
     if end < float(time[-1]) and energies.size > 1:
@@ -189,7 +189,7 @@ def _measure_landing(
 
 
 def _read_masses(run: OpenedRun) -> dict[int, float]:
-    """Return the known masses by part id [mass]."""
+    """Return the known masses, keyed by part id [mass]."""
     masses = run.masses
     if masses is None:
         return {}
@@ -237,7 +237,7 @@ def judge_parts(
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
-    """Judge whether each part of a deck or history can be switched; the rows ascend by part id.
+    """Judge whether each part of a deck or history can be switched; the rows are sorted by part id.
 
     Parameters
     ----------
@@ -267,13 +267,13 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; ``by_deck`` are its mass and its time step according to the deck."""
+    """Collect the data of a part; ``by_deck`` contains its mass and its time step according to the deck."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
-        counts = None  # The elements of the part may be in a file that was not read.
+        counts = None  # The elements may be defined in a file that was not read.
     if by_deck[1] is None:
         step, source = printed.get(part, (None, None))
     else:
@@ -314,7 +314,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the kind of a part: "spring" or "particles" if its elements are such, else its material's kind."""
+    """Return the kind of a part: "spring" or "particles" according to its elements, or else its material's kind."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:
@@ -327,7 +327,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with verdict and reasons; ``alone`` is the part that absorbs the landing alone."""
+    """Return the row of a part with verdict and reasons; only the part ``alone`` absorbs energy at the landing."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(
@@ -348,7 +348,7 @@ def _judge_part(
 
 
 def _describe_joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
-    """Yield the parts that welds and ties connect to a part; they are inactive while it is rigid."""
+    """Yield a remark that names the parts joined to a part; the welds and ties are inactive while it is rigid."""
     joined = inventory.joined.get(row.id, {}) if inventory else {}
     if joined:
         kinds = ", ".join(sorted(frozenset[str]().union(*joined.values())))
@@ -392,7 +392,7 @@ def _list_reasons_to_keep(
 
 
 def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
-    """Yield a reason if LS-DYNA would make one rigid body of the disconnected pieces of a part."""
+    """Yield a reason if LS-DYNA would make one rigid body of a part's disconnected pieces."""
     if (
         inventory is None
         or inventory.solver != "ls-dyna"
@@ -408,7 +408,7 @@ def _describe_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]
 def _list_unknowns(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
 ) -> Iterator[str]:
-    """Yield the missing data that a verdict on a part needs, if nothing speaks against switching the part."""
+    """Yield the missing data needed for a verdict on a part, if there is no reason against switching it."""
     if inventory is None:
         yield "without a deck it is unknown whether it is discrete, already rigid, or shares nodes"
     elif data is None:
@@ -451,7 +451,7 @@ def _list_remarks_on_switch(
 def compute_step_growth(
     rows: Sequence[PartRow], switched: Collection[int]
 ) -> float | None:
-    """Return the smallest factor by which the time step may grow while ``switched`` parts are rigid, at least 1 [-].
+    """Return the smallest growth factor of the time step while the ``switched`` parts are rigid, at least 1 [-].
 
     The result is None if the time step of a part that stays deformable is unknown, infinite if no part stays
     deformable.
@@ -484,7 +484,7 @@ def find_landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merge_rows(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Merge connected parts into one rigid body. The part with the first id is the lead part."""
+    """Merge connected parts into one rigid body, with the part of smallest id as the lead part."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

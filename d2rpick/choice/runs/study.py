@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# Status of a run. Runs with one of the first two values were judged.
+# Status of a run. A run with one of the first two values was judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -55,17 +55,17 @@ OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "out-of-range",
     "failed",
 )
-# Distance of Tukey's fences, beyond which a value is an outlier, from the quartiles, in interquartile ranges [-].
+# Distance of Tukey's fences from the quartiles, in interquartile ranges [-]; values beyond the fences are outliers.
 _FENCE: Final = 1.5
-# A sentence names at most this number of runs.
+# Largest number of runs that are named in a sentence.
 NAMED: Final = 3
-# Share of the rigid time that may be lost by rounding tr to fewer digits [-].
+# Largest fraction of the rigid time that may be lost by rounding tr to fewer digits [-].
 _ROUNDED: Final = 0.001
-# Codes of warnings about single runs that a study does not repeat, because the row of the run shows them.
+# Codes of the warnings about single runs that a study does not repeat, because the row of the run shows them.
 _NOT_REPEATED = ("no-candidate",)
-# A record is treated as cut off if it ends before this share of the median end time of all runs [-].
+# Smallest end time of a complete record, as a fraction of the median end time of all runs [-].
 _WHOLE: Final = 0.99
-# Number of intervals into which a drawn curve is divided; only the lowest and highest energy in each are drawn.
+# Number of intervals of a drawn curve; only the lowest and highest energy in each interval are drawn.
 _STRETCHES = 200
 
 
@@ -74,7 +74,7 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """The question that is answered for every run; ``td`` is a time, a window for td, or None for the longest flight.
+    """The question that is answered for every run; ``td`` is a time, a time range, or None for the longest flight.
 
     With ``curve`` an outline of the energy is kept for drawing.
     """
@@ -88,7 +88,7 @@ class Question:
 
 
 class Stamp(NamedTuple):
-    """Size in bytes and modification time in nanoseconds of a file when its run was read."""
+    """Size in bytes and modification time in nanoseconds of a file at the time of reading its run."""
 
     name: str
     size: int
@@ -138,7 +138,7 @@ class StudyRow:
 
 
 class Common(NamedTuple):
-    """One tr for all judged runs, with the window that all runs share [time]; None, with the reason, if no tr suits.
+    """The tr for all judged runs, with the window that all runs share [time]; None, with the reason, if none suits.
 
     ``keeps_tolerance``: tr lies within the timing tolerance of every run, so that no error exceeds the error at the
     run's own tr by more than 0.05.  ``errors`` are the errors at this tr, one for each run: residuals, or
@@ -153,7 +153,7 @@ class Common(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Smallest, median and largest tr of the runs for which a tr is recommended [time]."""
+    """Smallest, median and largest recommended tr of the runs [time]."""
 
     min: float
     median: float
@@ -162,7 +162,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyOfRuns:
-    """The answer of ``study``; ``agree`` is True if the intervals of tr intersect, None if there is no tr.
+    """The answer of ``study``; ``agree`` is True if the tr intervals of the runs intersect, None if there is no tr.
 
     ``td`` is None if each run has its own, chosen in ``td_window``, or in its longest flight if that is None too.
     """
@@ -182,20 +182,20 @@ class StudyOfRuns:
 
     @property
     def energy_unit(self) -> str:
-        """Unit of the energies; empty if the judged runs name different units."""
+        """Unit of the energies; empty if the units of the judged runs differ."""
         units = {row.energy_unit for row in self.runs if row.judged}
         return units.pop() if len(units) == 1 else ""
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: the worst grade of runs' pairs and of their errors at this tr; else None."""
+        """Grade of the common tr: the worst grade of any run's pair or of its error at this tr; None if unknown."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
         for row, error in zip(self.runs, self.common.errors, strict=True):
             if error is None or row.residual is None or row.basis == "energy":
                 continue
-            # The grade at the common tr is used only if it is worse than the grade of the residual at the run's own tr.
+            # The grade at the common tr is used only if it is worse than the grade at the run's own tr.
             at_common_tr = grade_residual(error)
             if GRADES.index(at_common_tr) < GRADES.index(grade_residual(row.residual)):
                 grades.append(at_common_tr)
@@ -203,12 +203,12 @@ class StudyOfRuns:
 
     @property
     def objection(self) -> bool:
-        """True if a run has no tr, or there is no common tr."""
+        """True if one of the runs has no tr, or if there is no common tr."""
         return self.common.tr is None or any(row.status != OK for row in self.runs)
 
 
 def judge_run(question: Question, source: str) -> StudyRow:
-    """Read and judge one run. Errors of the run are reported in its row.
+    """Read and judge one run. An error of the run is reported in its row.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def judge_run(question: Question, source: str) -> StudyRow:
 
 
 def make_row(source: str, answer: PairSuggestion) -> StudyRow:
-    """Return the row of a study from the answer for one run."""
+    """Return the row of a study for one run, made from the answer for this run."""
     best = answer.chosen
     situation = answer.situation
     acceptable = cut_before_td(
@@ -299,7 +299,7 @@ def _list_decision_fields(decision: Decision | None) -> dict[str, Any]:
 
 
 def make_failed_row(source: str, error: BaseException) -> StudyRow:
-    """Return the row of a run whose process returned none."""
+    """Return the row of a run whose process ended without an answer."""
     status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
     return StudyRow(source, status, f"{source}: {format_in_one_line(error)}")
 
@@ -320,7 +320,7 @@ def stamp_files(source: str) -> tuple[Stamp, ...]:
 def compare_rows(
     td: float | tuple[float, float] | None, rows: Sequence[StudyRow]
 ) -> StudyOfRuns:
-    """Compare the rows of a study; ``td`` is the requested td, or the requested window for td."""
+    """Compare the rows of a study; ``td`` is the requested td, or the requested range for td."""
     times, low, high = _find_common_interval(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None
@@ -338,7 +338,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs, and the interval that lies within the accuracy of each tr (empty if low > high)."""
+    """Return the tr of all runs, and the interval within the accuracy of every tr (empty if low > high)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
@@ -357,7 +357,7 @@ def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
 
 
 def describe_end_of_record(row: StudyRow) -> str:
-    """Return how the record of a run from `find_cut_runs` ends: within a state, or earlier than most others."""
+    """Describe how the record of a cut-off run ends: within a state, or earlier than most others."""
     if "truncated-input" in row.warnings:
         return f"cut at {row.record_end:g}"
     return f"ends early, at {row.record_end:g}"
@@ -381,7 +381,7 @@ def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
 
 
 def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
-    """Return a digest of each file of a run, or of the file's name if the file can no longer be read."""
+    """Return a digest of each file of a run, or of the file name if the file can no longer be read."""
     digests = []
     for stamp in row.files:
         try:
@@ -393,7 +393,7 @@ def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
 
 
 def _warn_about_runs(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
-    """Yield the warnings of single runs, and warnings about repeated, omitted and dissimilar runs."""
+    """Yield the warnings about single runs, and warnings about repeated, omitted and dissimilar runs."""
     repeated = find_repeated_runs(rows)
     if repeated:
         names = list_names([row.source for group in repeated for row in group], NAMED)
@@ -484,7 +484,7 @@ def choose_common_tr(rows: Sequence[StudyRow]) -> Common:
 
 
 def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
-    """Return the median tr of runs, moved into the interval common to all; None if the runs do not agree."""
+    """Return the median tr, moved into the interval common to all runs; None if the runs do not agree."""
     tr_of_runs, low, high = _find_common_interval(judged)
     if len(tr_of_runs) < len(judged) or low > high:
         return None
@@ -495,7 +495,7 @@ def _find_agreed_tr(judged: Sequence[StudyRow], keeping: Samples) -> float | Non
 def _find_least_loss(
     judged: Sequence[StudyRow], shared: Samples
 ) -> tuple[float, float]:
-    """Return the first interval of the shared windows in which the largest loss is at most 0.02 above its minimum."""
+    """Return the first interval of the shared windows whose largest loss is within 0.02 of the minimum."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(
         np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
@@ -529,12 +529,12 @@ def find_fewest_digits(low: float, high: float) -> float:
 
 
 def format_number_of_runs(number: int) -> str:
-    """Return a number of runs in words: "1 run", "2 runs"."""
+    """Return a number of runs in words, such as "1 run" or "2 runs"."""
     return "1 run" if number == 1 else f"{number} runs"
 
 
 def _explain_why_no_common(judged: Sequence[StudyRow]) -> str:
-    """Describe which tr is acceptable in most runs, and in which runs it is not."""
+    """Describe the tr that is acceptable in most runs, and name the runs in which it is not."""
     stretches, counts = count_coverage([row.acceptable for row in judged])
     if not counts.size:
         if len(judged) > 1:
@@ -557,7 +557,7 @@ def _is_in_windows(windows: Samples, time: float) -> bool:
 
 
 def find_outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
-    """Return the outliers: first judged runs for which no tr exists, then runs whose tr lies beyond Tukey's fences.
+    """Return the outliers: first the judged runs without any tr, then runs whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.
     """

@@ -1,1 +1,1 @@
-"""Compare finished switched runs with their reference."""
+"""Compare finished switched runs with their reference run."""

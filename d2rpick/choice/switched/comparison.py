@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched.switched_run import FEWEST, SAME, choose_same_parts
+from d2rpick.choice.switched.frozen import FEWEST, SAME
+from d2rpick.choice.switched.switched_run import choose_same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
@@ -25,24 +26,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# The motion after td is different if the momentum deviates by more than this share of the momentum [-].
+# Largest relative difference of the energies before the switch in two runs of the same model [-].
+_OF_ANOTHER_MODEL: Final = 0.2
+# Fraction of the record in which no run is switched yet, if the time of the switch is unknown [-].
+_EARLY: Final = 0.1
+# Largest relative deviation of the momentum after td at which the motions of both runs are treated as equal [-].
 MOST_MOMENTUM_ERROR = 0.05
-# Deviations are divided by at least this share of the largest momentum [-], because a body may be at rest.
+# Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
-# A note is issued if the energy reported while rigid differs from the energy at td by more than this share [-].
-# Such energies differ because some solvers report a wrong energy for rigid solid elements.
+# Largest relative difference of the energy reported while rigid from the energy at td without a note [-].
+# The reported energy can differ, because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
-# _STILL: an energy is constant if it changes by less than this share of the energy [-].
-# _STILL_OF_VIBRATION: a constant energy also changes by less than this share of the vibration energy [-].
+# _STILL: largest change of an energy that is treated as constant, relative to the energy [-].
+# _STILL_OF_VIBRATION: largest change of a constant energy, relative to the vibration energy [-].
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
-# The search for the switch to rigid tries this number of times between two states.
+# Number of trial times between two states in the search for the switch to rigid.
 _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of a switched run; unknown quantities are None.
+    """Measures of the difference between a switched run and its reference run; unknown quantities are None.
 
     The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
 
@@ -80,7 +85,7 @@ def compare_with_reference(
     switched: Reference,
     min_mean: float = 0.0,
 ) -> Comparison:
-    """Compare a finished switched run with its reference run, using the parts that both contain.
+    """Compare a finished switched run with its reference run, using the parts that both runs contain.
 
     Both are read in the same way.  ``situation`` is that of td in the reference run; ``min_mean`` is described at
     ``compare_runs``.
@@ -154,7 +159,7 @@ def compare_runs(
     is_reported : bool
         True if the switched run reports its energies correctly after td; if not, they are not compared.
     min_mean : float
-        Smallest mean energy after td as a share of that of the reference run [-]; 2 - ``min_mean`` is the largest.
+        Smallest mean energy after td as a fraction of that of the reference run [-]; 2 - ``min_mean`` is the largest.
 
     Raises
     ------
@@ -181,7 +186,10 @@ def compare_runs(
     rigid = _find_rigid_window(switched, tr, td, still)
     mean = float(energies_after.mean())
     mean_reference = float(reference_after.mean())
-    objections = [*_check_rigid_window(reference, switched, rigid, tr, td, still)]
+    objections = [
+        *check_same_model(reference, switched, min(rigid[0] if rigid else tr, tr)),
+        *_check_rigid_window(reference, switched, rigid, tr, td, still),
+    ]
     if is_reported:
         objections += _check_locked_in_energy(
             reference, tr, frozen, energy_td, tolerance
@@ -212,7 +220,7 @@ def compare_runs(
 def _select_energies_after(
     switched: History, td: float, end: float
 ) -> tuple[Samples, float | None]:
-    """Return the energies of the switched run from td to ``end``, preceded by a wrong energy of the rigid parts if any.
+    """Return the energies of the switched run from td to ``end``, and the energy reported while rigid if it is wrong.
 
     The second value is the energy that the solver reports while the parts are rigid, None if it is right.
     """
@@ -253,7 +261,7 @@ def _check_number_of_states(
 def _find_limit_of_change(
     reference: History, switched: History, tr: float, td: float
 ) -> float:
-    """Return the change up to which an energy is constant [energy]: its rounding error, or a small share of it."""
+    """Return the largest change of an energy that is treated as constant [energy]; it covers the rounding error."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
@@ -273,7 +281,7 @@ def _compute_energy_range(history: History, start: float, end: float) -> float:
 def _find_rigid_window(
     switched: History, tr: float, td: float, limit: float
 ) -> tuple[float, float] | None:
-    """Return the first and last state of constant energy around the middle of (tr, td); None if there is none."""
+    """Return the first and last time of constant energy around the middle of (tr, td); None if there is no state."""
     time = switched.time
     energy = switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
@@ -320,12 +328,29 @@ def _check_rigid_window(
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
+def check_same_model(
+    reference: History, switched: History, end: float
+) -> Iterator[str]:
+    """Yield an objection if the energies of two runs differ before ``end``, where both are deformable [time]."""
+    start = max(reference.start, switched.start)
+    time, energy = reference.between(start, min(end, switched.end))
+    largest = float(np.abs(energy).max(initial=0.0))
+    if time.size < FEWEST or largest <= round_off(reference):
+        return
+    difference = float(np.abs(switched.energies_at(time) - energy).max()) / largest
+    if difference > _OF_ANOTHER_MODEL:
+        yield (
+            f"the energies of the two runs differ by {difference:.0%} before {end:.6g}, when both are deformable, so "
+            "they seem to be runs of different models"
+        )
+
+
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
     """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # The error relative to the vibration energy has no meaning.
+        return  # Relative to the vibration energy, an error has no meaning if nothing vibrates.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -347,14 +372,14 @@ def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
 
 
 def _check_momentum(error: float | None) -> Iterator[str]:
-    """Yield an objection if the momentum after td differs by the share ``error`` from that of the reference run."""
+    """Yield an objection if the relative momentum error after td, ``error``, is too large."""
     if error is not None and error > MOST_MOMENTUM_ERROR:
         moved = f"the momentum of the switched run after td differs by {error:.1%}"
         yield f"{moved} from that of the reference run, so it moves differently"
 
 
 def find_switch_times(switched: History, reference: History) -> tuple[float, float]:
-    """Find tr and td of a switched run: in this window its energy is constant, but not that of the reference run.
+    """Find tr and td of a switched run: its energy is constant from tr to td, but that of the reference run is not.
 
     Returns
     -------
@@ -385,6 +410,8 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
             moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
+        early = reference.start + _EARLY * reference.duration
+        reason = "; ".join((*check_same_model(reference, switched, early), reason))
         cure = (
             switched.left_beside
             or "; give the run with the switching cards, or `tr` and `td`"
@@ -401,7 +428,7 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
 def _explain_why_no_times(
     switched: History, reference: History, spans: Sequence[tuple[int, int]]
 ) -> str:
-    """Explain why no rigid window is found; ``spans`` are the first and last states of times with constant energy."""
+    """Explain why no rigid window was found; ``spans`` are ranges (first, last) of states with constant energy."""
     if np.array_equal(switched.time, reference.time) and np.array_equal(
         switched.energy, reference.energy
     ):
@@ -414,7 +441,7 @@ def _explain_why_no_times(
 
 
 def _is_reported_wrong(rigid: float, energies_after: Samples) -> bool:
-    """Return True if the energy reported while rigid differs from the energy at td."""
+    """Return True if the energy reported while the parts are rigid differs from the energy at td."""
     usual = np.abs(np.diff(energies_after)).max()
     return bool(
         abs(rigid - energies_after[0])
@@ -438,7 +465,7 @@ def _compute_relative_distance(
 def _compute_distance(
     reference: Track | None, switched: Track | None, td: float, end: float
 ) -> float | None:
-    """Return the largest distance of the second track from the first between two times; None if one is missing.
+    """Return the largest distance between two tracks in a time range; None if a track is missing.
 
     The first state at or after td is left out, since the parts may still be rigid in that state.
     """

@@ -20,6 +20,7 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.switched.frozen import FEWEST, SAME, find_frozen_times
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import find_complete_stretches
 from d2rpick.histories.history import Given, History
@@ -37,20 +38,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 Times = tuple[float, float]
-# Sources of a flight whose start is accurate to a few states, unlike a flight found from the energy alone.
+# Sources that determine the start of a flight to within a few states, unlike the energy alone.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# The parts are treated as not moving if they carry less than this share of the momentum of the model [-].
+# Largest momentum of parts that are treated as not moving, as a fraction of the momentum of the model [-].
 _HARDLY: Final = 0.1
-# A part was rigid if it has no kinetic energy, or constant internal energy, in this many consecutive states.
-FEWEST: Final = 12
-# Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
-SAME: Final = 1e-6
-# A flight that begins within this number of output intervals after tr may have begun before tr.
+# Largest number of output intervals after tr at which a flight that seems to begin may have begun before tr.
 _SAME_STATES: Final = 3
 
 
 class DoneWindow(NamedTuple):
-    """A window in which a run was switched, with the flight around it, the actual and the planned landing.
+    """A window in which a run was switched, with the flight around it, and the actual and planned landing times.
 
     ``landing`` and ``planned`` are None if no contact is seen, or no earlier run is given; ``step`` is the output
     interval, below which both are equal [time].
@@ -83,19 +80,19 @@ class DoneWindow(NamedTuple):
 
     @property
     def rigid_in_contact(self) -> bool:
-        """True if a contact began or ended while the parts were rigid, so that the plan after it is invalid."""
+        """True if a contact began or ended while the parts were rigid, which invalidates the plan after it."""
         return self.landed_rigid or self.took_off is not None
 
     @property
     def moved(self) -> float | None:
-        """Delay of the landing relative to the plan [time]; None if one of them is unknown."""
+        """Delay of the landing relative to the plan [time]; None if either landing is unknown."""
         if self.landing is None or self.planned is None:
             return None
         return self.landing - self.planned
 
     @property
     def description(self) -> str:
-        """A sentence about the outcome of the window, for the user."""
+        """A sentence for the user about the outcome of the window."""
         if self.flight is None:
             return "no flight is found there"
         if self.took_off is not None:
@@ -151,7 +148,7 @@ def prepare_switched_history(
         cautions += _warn_about_deforming(reference, tr, td)
     absent = _find_absent_windows(reference)
     new = []
-    for absent_window in absent:
+    for absent_window in absent or _find_frozen_windows(history):
         start, end = absent_window.start, absent_window.end
         if not any(tr < end and start < td for tr, td in done):
             new.append(absent_window)
@@ -184,7 +181,7 @@ def select_model_momenta(history: History) -> History:
 
 
 def find_rigid_times(reference: Reference) -> tuple[Times, ...]:
-    """Return the windows in which parts are rigid according to their written quantities [time].
+    """Return the windows in which the output of the parts shows them to be rigid [time].
 
     If the whole record is rigid, parts with energy have no mass, or no part moves although the model does.
     """
@@ -248,7 +245,7 @@ def find_done_windows(
 def _find_flight_around(
     history: History, flights: Sequence[Flight], tr: float, td: float
 ) -> Flight | None:
-    """Return the flight with the longest overlap with a window; None if no flight overlaps it."""
+    """Return the flight with the longest overlap with a window; None if no flight overlaps the window."""
 
     def shared(flight: Flight) -> float:
         start = history.start if flight.start is None else flight.start
@@ -261,7 +258,7 @@ def _find_flight_around(
 def _warn_about_deforming(
     reference: Reference, tr: float, td: float
 ) -> Iterator[Caution]:
-    """Yield a warning that names the requested parts that deform in a window.
+    """Yield a warning that names the requested parts if they deform in a rigid window.
 
     Raises
     ------
@@ -343,10 +340,16 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
     return tuple(windows)
 
 
+def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
+    """Yield the windows in which the energy shows that the chosen parts were rigid."""
+    for start, end in find_frozen_times(history):
+        yield _AbsentWindow(start, end, "the chosen parts", whole=True)
+
+
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or else all parts, that have internal energy; only parts ``among`` the given, if any."""
+    """Return the chosen parts, or else all parts, that have internal energy; only those ``among`` the given, if any."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()
@@ -370,7 +373,7 @@ def detect_rigid_parts(
     ``time`` has the times of the parts' states, shape (n,).
     """
     inside = find_window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    # The solver switches at the first step after tr.
+    # The solver switches at the first step after tr, so the first state is skipped.
     inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))
     if not parts or len(time[inside]) < FEWEST:
         return None
@@ -420,14 +423,14 @@ def choose_same_parts(
         return (
             _choose_compared_parts(without, switched, pair, parts) if parts else as_read
         )
-    except FormatError:  # A quantity of the parts is missing in some states.
+    except FormatError:  # A part quantity is missing in some states.
         return as_read
 
 
 def _choose_compared_parts(
     without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
 ) -> SameParts:
-    """Choose the parts to compare among ``parts``, with objections and notes."""
+    """Choose the parts to compare from ``parts``, with objections and notes."""
     history = without.history
     rigid = detect_rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     only_some_rigid = rigid is not None and bool(rigid.any()) and not rigid.all()
@@ -477,7 +480,7 @@ def _choose_compared_parts(
 def _find_misreported(
     without: Reference, switched: OpenedRun, parts: tuple[Part, ...], pair: Times
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies after td and at tr differ by more than is possible."""
+    """Return the parts whose energies after td and at tr differ by more than is physically possible."""
     time = switched.part_time
     energies = switched.part_energies(parts)
     # In the first state at or after td, the parts may still be rigid.
@@ -497,5 +500,5 @@ def _find_misreported(
 
 
 def _list_part_names(parts: Iterable[Part]) -> str:
-    """Return a list of part names for a sentence."""
+    """Return part names as a list for use in a sentence."""
     return list_names([part.name for part in parts])

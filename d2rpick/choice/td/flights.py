@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
-# The search for a contact-free vibration starts at these times, given as shares of the record [-].
+# Times at which the search for a vibration without contact starts, as fractions of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-# Shorter rigid windows, as a share of the record, are left out [-] because they save less than a restart costs.
+# Shortest useful rigid window, as a fraction of the record [-]; shorter ones save less than a restart costs.
 MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
@@ -30,7 +30,7 @@ def find_longest_flight(
     *,
     otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
-    """Return the longest flight as a window for td within the record [time].
+    """Return the longest flight of the record as a range for td [time].
 
     If only the energy shows the flight, its end may differ from td to td; then the window keeps the margin.  If there
     is no flight, ``otherwise`` is returned.
@@ -74,7 +74,7 @@ def compute_last_td(end: float, margin: float) -> float:
 
 
 def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
-    """Find all flights of a record in time order; the flight that ends with a given landing ends at that time.
+    """Find all flights of a record in time order; a flight that ends with a given landing ends at that time.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
 def _add_given_start(
     history: History, settings: Settings, flights: tuple[Flight, ...]
 ) -> tuple[Flight, ...]:
-    """Add the flight that starts at the user-given end of the load, unless a flight contains that time."""
+    """Add a flight that starts at the end of the load given by the user, unless a flight already contains that time."""
     load_end = settings.after
     last = history.end
     windows = [flight.within(history.time) for flight in flights]
@@ -145,7 +145,7 @@ def _add_given_start(
 def _insert_flight(
     history: History, flights: tuple[Flight, ...], given_flight: Flight
 ) -> tuple[Flight, ...]:
-    """Return flights in ascending order, with the given flight replacing those that it overlaps."""
+    """Return flights in ascending order; the given flight replaces the flights that it overlaps."""
     first, last = given_flight.within(history.time)
     windows = ((flight, *flight.within(history.time)) for flight in flights)
     kept_flights = [
@@ -197,7 +197,7 @@ def _find_flights_without_landing(
             flight = look(first + share * (history.end - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                # The flight ends when the vibration ends, even if the user gives the start of the flight.
+                # The flight ends with its vibration, even if the user gives the start of the flight.
                 return (flight,)
         look = make_look(history, replace(settings, replay=False))
     flights: list[Flight] = []
@@ -207,7 +207,7 @@ def _find_flights_without_landing(
             continue
         situation = look(td)
         flight = situation.flight
-        # If a flight reaches the next one, the load between them was missed, so the end of the flight is unknown.
+        # If a flight reaches the next flight, the load between them was missed, so the end of the flight is unknown.
         lasts = (
             flights
             and flight.within(history.time)[1] > flights[-1].within(history.time)[0]
@@ -218,7 +218,7 @@ def _find_flights_without_landing(
 
 
 def list_momentum_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the momentum that shows the flight, and of the mass.
+    """Return the columns of the momentum that shows the flight, and of the mass, keyed by name.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
     are columns of the velocity.  The result is empty if neither is written at the times of the energy.

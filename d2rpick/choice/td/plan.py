@@ -1,4 +1,4 @@
-"""Plan the rigid windows of a run: the times for each flight, and which windows this reference run supports.
+"""Plan the rigid windows of a run: find the times for each flight, and which windows this reference run supports.
 
 A window in which nothing vibrates locks in no energy and does not move any landing.  A window that locks in energy
 moves the next landing by less than the margin, and later landings by more than any margin.  Therefore one reference
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# A window is left out if a later window is longer by more than this factor [-].
+# Smallest length ratio of a later window to an earlier window at which the earlier window is left out [-].
 # If a window of length w and a later window of length W are used, two successive runs are rigid for w and w + W.
 # If only the later window of length W is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
@@ -84,7 +84,7 @@ class PlannedFlight(NamedTuple):
 
     @property
     def rigid_fraction(self) -> float | None:
-        """Share of the record in which the parts are rigid because of this window [-]; None if there is no window."""
+        """Fraction of the record for which this window makes the parts rigid [-]; None if there is no window."""
         return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
@@ -94,17 +94,17 @@ class PlannedFlight(NamedTuple):
 
     @property
     def decision(self) -> Decision | None:
-        """Verdict on the pair as in ``suggest``; None if there is no pair, or if the window is done."""
+        """Verdict on the pair as in ``suggest``; None if there is no pair, or if a finished run has used the window."""
         return self.answer.decision if self.answer else None
 
     @property
     def quality(self) -> Quality | None:
-        """Grade of the pair as in ``suggest``; None if there is no window, or if the window is done."""
+        """Grade of the pair as in ``suggest``; None if there is no window, or if a finished run has used the window."""
         return self.answer.quality if self.answer and self.window else None
 
     @property
     def locks_in(self) -> bool | None:
-        """True if the window locks in energy, so that later landings move; None if there is no window.
+        """True if the window locks in energy, which shifts later landings; None if there is no window.
 
         The window locks in no energy if the energy is constant except for round-off, as in a free fall from rest.
         """
@@ -133,17 +133,17 @@ class RunPlan:
 
     @property
     def supported(self) -> tuple[PlannedFlight, ...]:
-        """Flights whose windows are supported by this reference run."""
+        """Flights with a window that this reference run supports."""
         return tuple(row for row in self.flights if row.status == "supported")
 
     @property
     def windows(self) -> tuple[Times, ...]:
-        """(tr, td) of the supported windows [time]."""
+        """Pairs (tr, td) of the supported windows [time]."""
         return tuple(row.window for row in self.supported if row.window)
 
     @property
     def all_windows(self) -> tuple[Times, ...]:
-        """(tr, td) of all windows that are not done, including those that need a switched run first [time]."""
+        """Pairs (tr, td) of all windows not yet computed, including those that need a switched run first [time]."""
         return tuple(
             row.window
             for row in self.flights
@@ -152,7 +152,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """(tr, td) of all windows of the next run, done and supported [time]; empty if no window is new.
+        """Pairs (tr, td) of all windows of the next run, used before or supported [time]; empty if no window is new.
 
         The next run starts again from the beginning, so it needs both kinds.
         """
@@ -165,12 +165,12 @@ class RunPlan:
 
     @property
     def rigid_fraction(self) -> float:
-        """Share of the record in which the parts are rigid because of the supported windows [-]."""
+        """Fraction of the record for which the supported windows make the parts rigid [-]."""
         return self.rigid_time / self.history.duration
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the windows, relative to the reference run [-]; None if the cost share is unknown."""
+        """Expected run time with the windows relative to the reference run [-]; None if the cost share is unknown."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -238,10 +238,10 @@ def _list_rows(
     shortest: float,
     done_rows: Sequence[DoneWindow],
 ) -> Iterator[PlannedFlight]:
-    """Yield every flight with its window, which is planned as if it were the first window."""
+    """Yield every flight with its window, which is planned as if it were the first window of the run."""
     last = max((done.td for done in done_rows), default=None)
     record = reference.history.duration
-    landed: float | None = None  # This is the end of the previous flight [time].
+    landed: float | None = None  # End of the previous flight [time].
     for number, found_flight in enumerate(flights, start=1):
         flight = _apply_given_start(reference.history, found_flight, settings.after)
         start, end = flight.within(reference.history.time)
@@ -271,7 +271,7 @@ def _list_rows(
 def _apply_given_start(
     history: History, flight: Flight, load_end: float | None
 ) -> Flight:
-    """Begin the flight that contains the given end of the load at that time, as ``suggest`` does."""
+    """Let the flight that contains the given end of the load begin at that time, as ``suggest`` does."""
     start, end = flight.within(history.time)
     if load_end is None or not start <= load_end < end:
         return flight
@@ -296,7 +296,7 @@ def _suggest_window(
     flight_settings = settings if is_after_here else replace(settings, after=None)
     if settings.landing is not None and not row.start < settings.landing <= row.end:
         flight_settings = replace(flight_settings, landing=None)
-    # At a td the energy alone may not show the end of the flight, so the margin before the listed end is kept.
+    # The energy alone may not show the end of the flight, so the margin is kept before the listed end.
     window = row.start, compute_last_td(row.end, row.margin.time)
     reference.history.check(*window, subject=f"flight {row.number},")
     answer = suggest_in_run(reference, window, flight_settings, since=landed)
@@ -342,7 +342,7 @@ def _explain_short_window(rigid: float, shortest: float, margin: Margin) -> str:
 
 
 def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
-    """Leave out each window that locks in energy if a much longer window follows, which would need a further run."""
+    """Leave out each window that locks in energy if a much longer window follows that would need a further run."""
     for index, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         longest_after = max(
@@ -391,7 +391,7 @@ def _mark_status(
 
 
 def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
-    """Yield a warning if a short window prevents a longer window from being supported by this run."""
+    """Yield a warning if a short window prevents this run from supporting a longer window."""
     first = next(
         (row for row in rows if row.status == "supported" and row.locks_in), None
     )
@@ -415,7 +415,7 @@ def _warn_about_blocked(rows: Sequence[PlannedFlight]) -> Iterator[Caution]:
 def _warn_about_windows(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[Caution]:
-    """Yield each warning about the windows once."""
+    """Yield the warnings about the windows, each of them once."""
     for done in done_rows:
         window = f"the window {done.tr:.6g} to {done.td:.6g}: {done.description}"
         if done.rigid_in_contact:
@@ -427,7 +427,7 @@ def _warn_about_windows(
         for caution in row.answer.cautions if row.answer else ():
             if (
                 caution.code == WRONG_ENERGY
-            ):  # The warning concerns the whole run, not a single flight.
+            ):  # This warning concerns the whole run, not a single flight.
                 continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)

@@ -1,4 +1,4 @@
-"""Choose td, in a window or in the longest flight, together with the tr for it."""
+"""Choose td, in a given range or in the longest flight, together with its tr."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# The search for the best td tries this number of the most promising energy peaks, and as many of the last peaks.
+# Number of the most promising energy peaks, and also of the last peaks, that the search for the best td tries.
 _MOST_PEAKS: Final = 12
-# For many modes, only windows of at least this length, relative to the longest window, are compared [-].
+# Smallest lengths of the windows compared for many modes, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
-# Good windows are treated as equally long if they have at least this share of the length of the longest [-].
+# Smallest relative length at which good windows are treated as equally long as the longest good window [-].
 _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in a uniform grid, which suffices for a smooth curve on paper and on a screen.
+# Number of td in a uniform grid; it suffices for a smooth curve on paper and on a screen.
 STEPS: Final = 200
 # Number of decimals with which errors are shown to the user.
 _READ: Final = 3
-# A pair is mentioned if its rigid time exceeds that of the recommended pair by this share of the td range [-].
+# Excess of rigid time over the recommended pair at which a pair is mentioned, as a fraction of the td range [-].
 _MUCH: Final = 0.1
-# Safety factor on the uncertainty of the contact time that is estimated from the energy [-].
-# In 20 computed falls, the estimate of the uncertainty was too small by a factor of up to 1.9.
+# Safety factor on the uncertainty of a contact time that is estimated from the energy [-].
+# In 20 computed falls, the uncertainty was up to 1.9 times its estimate.
 _HIDDEN: Final = 2.0
 
 
@@ -89,7 +89,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
     )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    # The level is reached at this state or after the state before it.
+    # The energy reaches the level at this state, or between it and the previous state.
     entered = time[np.maximum(_find_first_near(*extremes, level, near) - 1, 0)]
     return np.asarray(
         np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
@@ -99,7 +99,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Return the index of the first state with an energy at or beyond each level, or the number of states.
+    """Return the index of the first state with an energy at or beyond each level, or else the number of states.
 
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
@@ -112,7 +112,7 @@ def _find_first_near(
 
 
 class Chosen(NamedTuple):
-    """The ``situation`` of the td chosen in a window, and the ``longest`` acceptable pair in that window.
+    """The ``situation`` of the td chosen in a range, and the ``longest`` acceptable pair in that range.
 
     ``window`` is the requested window, ``inside`` the part of it that keeps the margin [time].
     """
@@ -138,7 +138,7 @@ def choose_td(
     since: float | None = None,
     times: Sequence[float] | None = None,
 ) -> Chosen:
-    """Choose td in ``window``, or in the longest flight if it is None, with a tr at or after ``since``.
+    """Choose td in ``window``, or in the longest flight if it is None, with a tr no earlier than ``since``.
 
     Of the pairs at all energy peaks only those of like quality are considered, and of these only those whose tr is most
     certain; the one with the longest rigid window wins.  If deformations are known, a residual within 0.02 of the
@@ -192,8 +192,8 @@ def choose_td(
 def list_offered_times(
     situation: Situation, window: tuple[float, float], steps: int
 ) -> tuple[Samples, set[float]]:
-    """Return a grid of td with the energy peaks, ascending [time], and the set of those that are peaks."""
-    # The grid omits the first time, because td must be after it.
+    """Return a grid of td that includes the energy peaks, ascending [time], and the set of the peaks."""
+    # The grid omits the start of the range, because td must be later.
     grid = np.linspace(*window, steps + 1)[1:]
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
@@ -203,12 +203,12 @@ def list_offered_times(
         peaks = peaks[highest]
         grid = np.delete(grid, intervals[highest])
     times = merge_times(grid, peaks)
-    # The end of the run is no td, because a run that ends at td is useless.
+    # The end of the run is omitted, because a run that ends at td is useless.
     return times[times < situation.history.end], set(peaks.tolist())
 
 
 def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
-    """Return the error by which pairs are compared across td [-]; None if there is no pair or if its level is too high.
+    """Return the error by which pairs are compared across td [-]; None if there is no pair or its level is too high.
 
     A level is too high if it exceeds the largest possible vibration energy.
     """
@@ -227,14 +227,14 @@ def get_error_of_pair(situation: Situation, best: Pair | None) -> float | None:
 
 
 def round_error(error: float | None) -> float:
-    """Round an error to the digits that are shown to the user; infinite if it is unknown."""
+    """Round an error to the digits shown to the user; infinity stands for an unknown error."""
     return np.inf if error is None else round(error, _READ)
 
 
 def _find_unbeaten(
     td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
 ) -> float:
-    """Return ``td``, or a td of ``times`` with a pair that is better in error or rigid time and worse in neither.
+    """Return ``td``, or one of ``times`` whose pair is better in error or rigid time and worse in neither.
 
     Of several better td the one with the longest rigid time is returned.  The peaks were compared by one view of the
     flight; the energy alone shows a different flight to each td.  If only pairs judged by the level (``at_level``) can
@@ -274,7 +274,7 @@ def _find_unbeaten(
 
 
 def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
-    """Return True if a pair at the td of a situation may be as good as given, in error and in rigid time.
+    """Return True if a pair at the td of a situation may be at least as good as ``choice``, in error and in rigid time.
 
     Pairs by deformations are not compared with pairs by levels.
     """
@@ -295,7 +295,7 @@ def _can_beat(situation: Situation, choice: Choice, error: float) -> bool:
 
 
 def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Choice]:
-    """Return the choices that are better than a given one in error or rigid time and worse in neither.
+    """Return the choices that are better than the given choice in error or rigid time and worse in neither.
 
     Errors are compared as printed.
     """
@@ -317,7 +317,7 @@ def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Cho
 def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Return the situation with the most certain flight in ``window``, and the part of it that keeps the margin [time].
+    """Return the situation with the most certain flight in ``window``, and the td range that keeps the margin [time].
 
     Raises
     ------
@@ -330,7 +330,7 @@ def find_best_known(
 
 
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in the window that keeps the margin even after rounding to printed digits.
+    """Return the last td in the range that keeps the margin even after rounding to printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
     """
@@ -345,13 +345,13 @@ def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
 
 
 def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in a window in which nothing vibrates.
+    """Return the last td in a range in which nothing vibrates.
 
     This td lies before the last state, and before the contact by the time that the contact may move.
     """
     history = situation.history
     flight = situation.flight
-    # The last state is no td, because a run that ends at td is useless.
+    # The last state is omitted, because a run that ends at td is useless.
     last = min(window[1], round_down_as_read(float(history.time[-2])))
     spread = situation.expected_margin.spread
     if flight.end is None or not spread:
@@ -360,7 +360,7 @@ def _find_last_at_rest(situation: Situation, window: tuple[float, float]) -> flo
 
 
 def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
-    """Return the first situation with the most certain flight, at the start, middle or end of the window.
+    """Return the first situation with the most certain flight, at the start, middle or end of the range.
 
     Of flights of equal certainty, one that covers some of the window goes before another, which only ends in it.
     """
@@ -376,7 +376,7 @@ def _find_flying(look: Look, window: tuple[float, float]) -> Situation:
 def _rate_certainty(
     situation: Situation, window: tuple[float, float]
 ) -> tuple[bool, int, bool]:
-    """Return a sort key for the certainty that td lies in a flight: the smallest is the most certain."""
+    """Return a sort key for the certainty that td lies in a flight; the smallest key is the most certain."""
     low, high = window
     start, end = situation.flight.within(situation.history.time)
     only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
@@ -390,7 +390,7 @@ def _rate_certainty(
 def _choose_by_residual(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return two td: the longest rigid window among the best residuals, and the longest rigid window of all."""
+    """Return the td of the longest rigid window among the smallest residuals, and that of the longest window of all."""
     peaks = situation.peaks(*window)
     highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
         :_MOST_PEAKS
@@ -407,7 +407,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr among those that are long enough to be planned, if any."""
+    """Return the pairs with the most certain tr, only from those long enough to be planned if there are any."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -422,7 +422,7 @@ def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
 
 
 def _rate_tr_at(situation: Situation) -> int:
-    """Return how certain the tr recommended at a td is, from 0 to 2; 0 if no tr is recommended."""
+    """Return the certainty of the tr recommended at a td, from 0 to 2; 0 if no tr is recommended."""
     best = next(rank_candidates([situation], in_flight=True)).chosen
     return 0 if best is None else rate_certainty_of_tr(best)
 
@@ -430,7 +430,7 @@ def _rate_tr_at(situation: Situation) -> int:
 def _choose_by_modes(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return, for many modes, the td of a long window with a small residual, and that of the longest acceptable window.
+    """Return, for many modes, the td of a long window with a small residual, and the td of the longest acceptable one.
 
     The energy at td does not matter.  Among good windows the longest one is used, since a longer rigid time is worth
     more than a still smaller residual.  If no long window is good, a shorter good window is used.  Without any good
@@ -488,7 +488,7 @@ def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
 def _list_times_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Return the td with the smallest residuals, rigid for ``share`` of the longest time; empty for few td.
+    """Return the td of the smallest residuals with rigid times of at least ``share`` of the longest; empty for few td.
 
     ``bounds`` are the first td, the first tr and the last td [time].
     """
@@ -521,7 +521,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error of a tr between two times [-], and that tr [time]; else infinity."""
+    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; infinity if none."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
@@ -533,7 +533,7 @@ def _find_least_error(
 def _choose_by_level(
     situation: Situation, window: tuple[float, float], look: Look
 ) -> tuple[float | None, float | None]:
-    """Return the td chosen by the level alone; the best level is the closest to the largest vibration energy, 2 <E>."""
+    """Return the td chosen by the energy level alone; the best level is closest to the peak vibration energy, 2 <E>."""
     mean = compute_mean_in_flight(situation)
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
@@ -541,7 +541,7 @@ def _choose_by_level(
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, compute_shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    # Fitting an oscillator at each td would take too long.
+    # No oscillator is fitted at each td, because this would take too long.
     best = next((td for td in below if _select_acceptable([situation.at(td)])), None)
     if best is None:
         return None, None
@@ -572,7 +572,7 @@ def _list_by_rigid_time(
 
 
 def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """Return the situations whose recommended pair saves time, with this pair."""
+    """Return the situations whose recommended pair saves time, each with its pair."""
     return [
         (candidates.situation, candidates.saving)
         for candidates in rank_candidates([*situations], in_flight=True)
@@ -581,7 +581,7 @@ def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
 
 
 def _find_longest(pairs: Iterable[Choice]) -> Choice | None:
-    """Return the choice with the longest rigid time, or the last of several equal choices; else None."""
+    """Return the choice with the longest rigid time, or the last of several equal choices; None if there is none."""
     return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
 
 

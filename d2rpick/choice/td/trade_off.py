@@ -1,4 +1,4 @@
-"""Find the error and the rigid time of the best tr for each td of a grid, and for the energy peaks."""
+"""Find the error and the rigid time of the best tr for each td of a grid and for each energy peak."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Another td is mentioned if its displayed error is at most this share of the displayed error at the given td [-].
+# Largest displayed error of another td that is mentioned, as a fraction of the displayed error at the given td [-].
 _MUCH_LESS: Final = 0.5
-# Another pair is mentioned only if its rigid time is at least this share of that of the given pair [-].
+# Smallest rigid time of another pair that is mentioned, as a fraction of the given pair's rigid time [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td on the grid of a page, at which a curve has a point every few pixels.
+# Number of td values in the grid of a page, so that its curve has a point every few pixels.
 _STEPS_OF_PAGE: Final = 120
-# Smallest number of td per flight if a plan has many flights.
+# Smallest number of td values per flight if a plan has many flights.
 _FEWEST_STEPS: Final = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Offer(AnswerAtTd):
-    """The answer of ``suggest`` for one td. Most of its values are computed only when they are used.
+    """The answer of ``suggest`` for one td of the trade-off. Most of its values are computed only when they are used.
 
     ``candidates`` end with the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other
     offer has less error and saves as much, or saves more with no more error.  ``recommended``: it is the answer of
@@ -73,12 +73,12 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The recommended pair at this td, which is used to compare offers; None if no tr is recommended."""
+        """The recommended pair at this td, by which different td are compared; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
     def error(self) -> float | None:
-        """Error by which offers are compared [-].
+        """Error by which the pairs of different td are compared [-].
 
         This error is the residual; on basis "energy" the shortfall of the level at td from the largest vibration
         energy, 1 - sqrt(E(td)/(2 <E>)).
@@ -102,7 +102,7 @@ class Offer(AnswerAtTd):
 
     @property
     def saving(self) -> float | None:
-        """Share of the run time that is saved [-]; None if the cost of the parts is unknown."""
+        """Fraction of the run time that is saved [-]; None if the cost of the parts is unknown."""
         share = self.best.run_time_share if self.best else None
         return None if share is None else 1 - share
 
@@ -127,7 +127,7 @@ class Offer(AnswerAtTd):
 
     @cached_property
     def decision_with_cure(self) -> Decision | None:
-        """The verdict with the better pair that ``suggest`` names."""
+        """The verdict, with the better pair that ``suggest`` would name."""
         return decide_with_better_pair(self.answer)
 
     @property
@@ -137,14 +137,14 @@ class Offer(AnswerAtTd):
 
     @property
     def mean_energy_bounds(self) -> MeanEnergyBounds | None:
-        """Bounds of the mean energy after td, relative to the reference run."""
+        """Bounds of the mean energy after td relative to the reference run [-]."""
         return self.answer.mean_energy_bounds
 
 
 def make_offers(
     situations: Sequence[Situation], peaks: Container[float]
 ) -> Iterator[Offer]:
-    """Yield the offer of each situation; ``peaks`` are the times of the energy peaks [time]."""
+    """Yield the proposal (`Offer`) for the td of each situation; ``peaks`` are the times of the energy peaks [time]."""
     for judged in judge_candidates(situations, in_flight=True):
         candidates_of_each = [*rank_judged(judged)]
         orders = [
@@ -156,7 +156,7 @@ def make_offers(
         judged_up_to_best = judged.at(np.concatenate(orders))
         ends = accumulate(
             rows.size for rows in orders
-        )  # Candidates before the flight are omitted, since noisy records have very many.
+        )  # Candidates before the flight are omitted, because noisy records have very many of them.
         for candidates, rows, end in zip(candidates_of_each, orders, ends, strict=True):
             best = replace(
                 candidates,
@@ -168,7 +168,7 @@ def make_offers(
 
 @dataclass(frozen=True)
 class TradeOff:
-    """The answer of ``explore``: the offers in ascending order of td in ``td_window`` [time], which keeps the margin.
+    """The answer of ``explore``: proposals by ascending td in the range ``td_window`` [time], which keeps the margin.
 
     ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
     window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
@@ -188,7 +188,7 @@ class TradeOff:
 
     @property
     def more_accurate(self) -> Offer | None:
-        """The offer with the smallest error; None if it is the recommended offer, or has another kind of error."""
+        """The proposal with the smallest error; None if it is the recommended one, or has another kind of error."""
         recommended = self.recommended
         if recommended is None:
             return None
@@ -203,7 +203,7 @@ class TradeOff:
         return min(smaller, key=lambda offer: round_error(offer.error), default=None)
 
     def decide_on(self, offer: Offer) -> Decision | None:
-        """Return the verdict on the pair of an offer as ``suggest`` gives it, with a better pair if there is one.
+        """Return the verdict on a proposed pair as ``suggest`` gives it, with a better pair if there is one.
 
         If no other td is clearly better than the requested one, its cure says so.
         """
@@ -224,7 +224,7 @@ def explore_run(
     steps: int = STEPS,
     since: float | None = None,
 ) -> TradeOff:
-    """Find the best pair for each of many td in a window.
+    """Find the best pair for each of many td in a range.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # The full search is used, because it gives the reason why there is no oscillator.
+    # The full search is used, because it finds out why there is no oscillator.
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
@@ -271,10 +271,10 @@ def explore_run(
     ]
     requested = next((offer for offer in offers if offer.td == td), None)
     situation = fully(known_best.td)
-    # Before the first td of the flight there are too few states to show a vibration.
+    # Before the first td of the flight, there are too few states to show a vibration.
     warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        # The energy alone shows a different flight for each td, so the flight that ``suggest`` finds is shown.
+        # The energy alone shows a different flight for each td, so the flight found by ``suggest`` is shown.
         situation = warned = fully(td)
     start = requested or max(
         filter(_is_comparable, offers),
@@ -295,12 +295,12 @@ def explore_run(
 
 
 def _is_comparable(offer: Offer) -> bool:
-    """Return True if an offer can be compared: it has a pair that saves run time, and an error."""
+    """Return True if a proposal can be compared: its pair saves run time and has a known error."""
     return offer.candidates.saving is not None and offer.error is not None
 
 
 def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
-    """Mark the Pareto-optimal offers; errors of deformations are not compared with errors of energies."""
+    """Mark the Pareto-optimal proposals; deformation errors are not compared with energy-level errors."""
     unbeaten = set()
     for is_residual in (True, False):
         group = [
@@ -330,7 +330,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest offer with half the error, else the recommended offer if it is better, else None.
+    """Return the nearest proposal with half the error, or else the recommended proposal if it is better, or else None.
 
     Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """
@@ -366,7 +366,7 @@ def _warn_about_window(
     offers: Sequence[Offer],
     suggestion: PairSuggestion,
 ) -> Iterator[Caution]:
-    """Yield the warnings that concern the window; warnings about a single td belong to the offer for this td."""
+    """Yield the warnings about the td range; warnings about a single td belong to the proposal for this td."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (
         caution for caution in warn_about_td(situation) if caution.code not in of_td
@@ -383,7 +383,7 @@ def _warn_about_window(
 
 
 def _explain_by_limits(suggestion: PairSuggestion) -> str:
-    """Describe the limits that the nearest candidate exceeds at the td of ``suggest``; empty if there are none."""
+    """Describe the limits that the nearest candidate exceeds at the td of ``suggest``; empty if it exceeds none."""
     if suggestion.recommended or not suggestion.candidates:
         return ""
     nearest = suggestion.candidates[0]
@@ -395,7 +395,7 @@ def _explain_by_limits(suggestion: PairSuggestion) -> str:
 
 
 def explore_flights(reference: Reference, plan: RunPlan) -> tuple[TradeOff, ...]:
-    """Explore other td for each flight of a plan. The more flights there are, the coarser are the grids."""
+    """Explore other td for each flight of a plan. The grids are coarser if there are more flights."""
     answers = {
         row.number: row.answer for row in plan.flights if row.answer and row.window
     }

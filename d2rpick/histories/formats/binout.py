@@ -36,7 +36,7 @@ _BRANCHES: Final = ("glstat", "matsum")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files of each folder as one restart segment; a solver writes all files of a binout to one folder."""
+    """Open the files in each folder as one restart segment, because a solver writes a whole binout to one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
@@ -84,7 +84,7 @@ class Binout(Database):
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # a property overrides a field
-        """The parts of the matsum branch, in the order of its first list of ids."""
+        """The parts of the matsum branch, in the order of the first list of ids."""
         _, branch = self._branches
         return tuple(
             Part(number, branch.legend.get(number, "")) for number in branch.part_ids
@@ -92,7 +92,7 @@ class Binout(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts (one force for both sides), and of the rigid walls."""
+        """Forces of the contacts (one force for both sides of a contact) and of the rigid walls."""
         return read_binout_forces(self._files)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
@@ -100,7 +100,7 @@ class Binout(Database):
         return {file.source: file.find_resume_point(_BRANCHES) for file in self._files}
 
     def branch(self, name: str) -> Branch:
-        """Return a branch by name; raise FormatError if it is missing, or if records of any branch are lost."""
+        """Return a branch by name; raise FormatError if the branch is missing, or if records of any branch are lost."""
         for branch in self._branches:
             if branch and branch.damage:
                 raise FormatError(
@@ -112,7 +112,7 @@ class Binout(Database):
         raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        """Return the message that no file of the restart segment has a branch of this name."""
+        """Return the message that no file of the restart segment has a branch with this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
             f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Number of values read at a time; it keeps the index arrays small compared with the result.
+# Number of values read at a time; it is small, so that the index arrays need little memory.
 _CHUNK: Final = 1 << 17
 
 
@@ -41,27 +41,27 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Split the group into groups with so few states that ``width`` values of each state fit into a piece."""
+        """Split the group into subgroups with few enough states that ``width`` values per state can be read at once."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
             yield Group(self.file, self.layout, self.rows[part], self.starts[part])
 
     def values(self, variable: Variable, indices: Indices) -> NDArray[Any]:
-        """Return the values at ``indices`` of a list, shape (states, indices), as integers or doubles."""
+        """Return the values at the ``indices`` of a list variable, shape (states, indices), as integers or doubles."""
         positions = (
             self.starts[:, None] + variable.offset + variable.dtype.itemsize * indices
         )
         values = self.file.read(positions, variable.dtype)
         if variable.dtype.kind != "f":
             return values
-        # A NaN is refused later, unless the value is not used.
+        # A NaN causes an error later, but only if the value is used.
         with np.errstate(invalid="ignore"):
             return values.astype(np.float64)
 
 
 def _read_start(file: Lsda, branch: str) -> float:
-    """Return the time of the first state of a branch in a file, or -inf if the state contains no time."""
+    """Return the time of the first state of a branch in a file, or -inf if this state contains no time."""
     _, start, layout = file.visits[branch][:3]
     variable = file.layouts[layout].variables.get("time")
     if variable is None or not variable.count:
@@ -78,7 +78,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield the signs that records of one file are lost or misplaced, as text."""
+    """Yield descriptions of signs that records of one file are lost or misplaced."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
@@ -93,7 +93,7 @@ def _find_damages(
 def _group_states(
     layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices
 ) -> Iterator[Group]:
-    """Yield the states grouped by layout; ``kinds`` are the indices of their layouts in ``layouts``."""
+    """Yield the states grouped by layout; ``kinds`` contains the indices of their layouts in ``layouts``."""
     order = np.argsort(kinds, kind="stable")
     cuts = np.flatnonzero(np.diff(kinds[order])) + 1
     for rows in np.split(order, cuts) if order.size else ():
@@ -102,7 +102,7 @@ def _group_states(
 
 
 class Branch(Database):
-    """The states of one branch in all files of a family; it is falsy if no file has the branch.
+    """The states of one branch in all files of a family; the object is falsy if no file has the branch.
 
     A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
     state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
@@ -170,7 +170,7 @@ class Branch(Database):
         return any(self.name.split("/")[0] in file.names for file in self._files)
 
     def _remarks(self) -> tuple[str, ...]:
-        """Return notes on missing or omitted states, and on variables that some states lack."""
+        """Return notes on missing or omitted states, and on variables that are missing in some states."""
         notes = [
             f"{name}: the last state of {self.name} is not whole and was left out"
             for name in self._unfinished
@@ -211,7 +211,7 @@ class Branch(Database):
 
     @property
     def scalars(self) -> tuple[str, ...]:
-        """Floating-point variables with one value in every state, in the order of the file."""
+        """Floating-point variables that have one value in every state, in the order of the file."""
         first = self._variables[0] if self._variables else {}
         return tuple(
             name
@@ -224,7 +224,7 @@ class Branch(Database):
 
     @property
     def time_width(self) -> int:
-        """Smallest number of bytes of a time in any state; integer times are refused when they are read."""
+        """Smallest number of bytes of a time in any state; integer times cause an error when they are read."""
         widths = [
             variables["time"].dtype.itemsize
             for variables in self._variables
@@ -234,7 +234,7 @@ class Branch(Database):
 
     @cached_property
     def legend(self) -> dict[int, str]:
-        """Titles of the parts by id."""
+        """Titles of the parts, keyed by part id."""
         titles: dict[int, str] = {}
         for file, start, layout in self._metadata:
             ids = _read_integers(file, start, layout, "legend_ids")
@@ -249,7 +249,7 @@ class Branch(Database):
 
     @cached_property
     def part_ids(self) -> tuple[int, ...]:
-        """Ids of all parts that occur in any state, in the order of the lists of ids."""
+        """Ids of all parts that occur in any state, in the order of the id lists."""
         # A dictionary is used as a set that keeps its order.
         part_ids: dict[int, None] = {}
         for group in self._groups:
@@ -260,7 +260,7 @@ class Branch(Database):
         return tuple(part_ids)
 
     def text(self, name: str) -> str:
-        """Return the metadata text of this name; empty if there is none."""
+        """Return the metadata text with this name; empty if there is none."""
         for file, start, layout in self._metadata:
             if name in layout.variables:
                 return clean_text(file.raw(start, layout.variables[name]))
@@ -303,7 +303,7 @@ class Branch(Database):
         return columns
 
     def checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
-        """Yield each group with its variable of this name.
+        """Yield each group of states together with its variable of this name.
 
         A count that fits neither the parts nor the other states shows that records of two states were merged; then no
         value of the state can be trusted.
@@ -334,14 +334,14 @@ class Branch(Database):
         return {self._variables[0].get(name, group.layout.variables[name]).count}
 
     def _list_lengths(self, group: Group) -> set[int]:
-        """Return the possible numbers of parts in a group, from its list of ids or the lists in the metadata."""
+        """Return the possible numbers of parts in a group, from its id list or from the lists in the metadata."""
         ids_of_states = group.layout.variables.get("ids")
         if ids_of_states:
             return {ids_of_states.count}
         return {ids.size for _, _, ids in self._id_lists}
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        """Return the error for a value of an unreliable state."""
+        """Return the error for a value from an unreliable state."""
         return FormatError(
             f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
         )
@@ -357,7 +357,7 @@ class Branch(Database):
 
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
-        """The lists of part ids in the metadata, each with the number of its file and its byte offset."""
+        """The part id lists in the metadata, each with the number of its file and its byte offset."""
         lists = (
             (file, at, _read_integers(file, at, layout, "ids"))
             for file, at, layout in self._metadata
@@ -382,7 +382,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state applies to it. A file of an MPI rank may have its list after its first states.
+        # The last list before a state applies to it. A file from an MPI rank may have its list after its first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {
@@ -399,7 +399,7 @@ class Branch(Database):
         return np.stack([lists[i] for i in in_force.tolist()])
 
     def _places(self, group: Group, listed: Indices, id_: int) -> Indices:
-        """Return the index of a part in the list of each state, shape (states,) or (1,)."""
+        """Return the index of a part in the id list of each state, shape (states,) or (1,)."""
         is_part = listed == id_
         times = is_part.sum(axis=1)
         if (times != 1).any():
@@ -414,14 +414,14 @@ class Branch(Database):
 
 
 def _is_scalar_variable(variable: Variable | None) -> bool:
-    """Return True if a variable is a single floating-point value."""
+    """Return True if a variable consists of a single floating-point value."""
     return variable is not None and variable.count == 1 and variable.dtype.kind == "f"
 
 
 def _read_integers(
     file: Lsda, start: int, layout: DirectoryLayout, name: str
 ) -> Indices:
-    """Return the list of integers of this name in a directory, empty if there is none."""
+    """Return the list of integers with this name in a directory; empty if there is none."""
     variable = layout.variables.get(name)
     if variable is None or variable.dtype.kind not in "iu":
         return np.empty(0, dtype=np.int64)

@@ -29,7 +29,7 @@ def has_forces(files: Sequence[Lsda]) -> bool:
 
 
 def read_binout_forces(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
-    """Return the forces of all contacts and rigid walls of a family; raise FormatError if they cannot be assigned."""
+    """Return the forces of all contacts and rigid walls of a family; raise FormatError if they are ambiguous."""
     branches = [ForceBranch(name, files, by_part=True) for name in FORCES]
     return tuple(
         force
@@ -40,17 +40,17 @@ def read_binout_forces(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
 
 
 class ForceBranch(Branch):
-    """A branch whose variables are lists, with one value for each side of each contact or for each wall."""
+    """A branch whose variables are lists, with one value for each side of each contact, or for each wall."""
 
     @property
     def writes_forces(self) -> bool:
-        """True if the states contain forces. A run without contacts writes states that contain only a time."""
+        """True if the states contain forces. In a run without contacts, the states contain only a time."""
         return bool(self._variables) and all(
             "x_force" in variables for variables in self._variables
         )
 
     def of_each(self, name: str) -> tuple[Indices, Samples]:
-        """Return the listed ids (a contact has an id for each side), and the values of one variable, shape (n, ids)."""
+        """Return the listed ids (one for each side of a contact), and the values of one variable, shape (n, ids)."""
         listed: Indices | None = None
         columns: list[tuple[Indices, Samples]] = []
         for group, variable in self.checked(name):
@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force for each contact. Its two sides have opposite forces, or only one side has a force."""
+    """Yield one force for each contact. The two sides have opposite forces, or only one side has a force."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

@@ -20,23 +20,23 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Value in place of the offset of a field that is truncated, or that occurs twice in the block.
+# Value that replaces the offset of a field if the field is truncated, or occurs twice in the block.
 UNSURE: Final = -1
 
-# A line of at least this length is longer than any line that a solver writes [bytes].
+# Smallest length of a damaged line [bytes]; solvers write no line of this length.
 _OVERLONG: Final = 512
 
-# Number of bytes that are compared at once, which fit into the processor's cache.
+# Number of bytes that are compared at once; they fit into the processor's cache.
 CHUNK: Final = 1 << 20
-# Number of adjacent blocks compared as one row, which halves the time.
+# Number of adjacent blocks that are compared as one row, which halves the computing time.
 _FOLD: Final = 16
-# Largest block that is compared with other blocks [bytes]; longer blocks are parsed one by one.
+# Largest block that is compared with other blocks [bytes]; larger blocks are parsed one by one.
 _LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
 _EXACT: Final = 22  # Largest exponent of a power of ten that a double holds exactly.
-# Bit flags of a negative exponent and of a negative number; lower bits hold the two digits of the exponent.
+# Bit flags of a negative exponent and of a negative number; the lower bits contain the two exponent digits.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
 
@@ -56,7 +56,7 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """Description of the blocks of one file format, from which the blocks of a file can be read.
+    """Description of the blocks of a file format, which is sufficient for reading a file.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
     these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
@@ -80,7 +80,7 @@ class Grammar(NamedTuple):
     compare_all: bool
 
     def layout(self, block: bytes) -> BlockLayout:
-        """Find the layout of a block."""
+        """Determine the layout of a block."""
         literal = np.full(len(block), 255, np.uint8)
         lines = [*self.lines.finditer(block)]
         edges = [0, *(edge for line in lines for edge in line.span()), len(block)]
@@ -115,7 +115,7 @@ def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
 
 
 def make_head(title: str, database: str) -> str:
-    """Return the two header lines of a generated file. They name no release, since no solver wrote the file."""
+    """Return the two header lines of a generated file. They name no release, because no solver wrote the file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
@@ -132,7 +132,7 @@ def count_like_example(
     data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
     take: Callable[[Bytes], object] | None = None,
 ) -> int:  # fmt: skip
-    """Count the blocks of ``run`` whose fixed bytes, starting at ``offset``, equal those of its example.
+    """Count the blocks of ``run`` whose fixed bytes, starting at ``offset``, equal those of the example block.
 
     Parameters
     ----------
@@ -199,14 +199,14 @@ def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
-    # A bit equals that of the example in all rows if AND and OR of the rows both equal the example.
+    # A bit equals that of the example in all rows if the AND and the OR of the rows both equal the example.
     bits_of_all = _reduce_rows(np.bitwise_and, rows, size)
     bits_of_any = _reduce_rows(np.bitwise_or, rows, size)
     return np.asarray((bits_of_all ^ example) | (bits_of_any ^ example))
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Combine rows of one or more blocks of ``size`` bytes into one block by a bitwise operation."""
+    """Combine rows, each containing one or more blocks of ``size`` bytes, into one block by a bitwise operation."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -279,7 +279,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
+    """Return factor and divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
 
     Factor and divisor are NaN if the conversion would be inexact.
     """
@@ -312,7 +312,7 @@ def parse_fortran_number(text: bytes) -> float:
 
 
 def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
-    """Return the values of fixed-width fields, exactly those of ``float()``; NaN for a field that is not a number.
+    """Return the values of fixed-width fields, equal to those of ``float()``; NaN for a field that is not a number.
 
     Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
     both exact doubles, so their product or quotient is correctly rounded. ``number`` converts all others.
@@ -343,7 +343,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     mark = width - 4
     negative = column[point - 2] == ord("-")
     shrinks = column[mark + 1] == ord("-")
-    # uint8 wraps around below "0", so one comparison finds all characters that are not digits.
+    # uint8 wraps around below "0", so a single comparison finds all characters that are not digits.
     digits = column[
         [point - 1, *range(point + 1, mark), mark + 2, mark + 3]
     ] - np.uint8(ord("0"))

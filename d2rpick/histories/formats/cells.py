@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 _COMMENTS: Final = ("#", "$", "%", "//")
 # Values that spreadsheets write if a computation fails, in English and German.
-# A line that begins with such a value is a row, although "#" is the comment character.
+# A line that begins with such an error value is a row, although "#" is the comment character.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -33,27 +33,27 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
 # Pattern of the characters that replace a number that is too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
-# Pattern of a number for each decimal sign.
-# The possessive quantifiers avoid backtracking, so that the time is linear in the length of a cell.
+# Pattern of a number, keyed by decimal sign.
+# The possessive quantifiers avoid backtracking, so that matching time is linear in the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
-# Template of a number with thousands separators; separator and decimal sign are inserted into the template.
+# Template of the pattern of a number with thousands separators, for a given separator and decimal sign.
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
-# Thousands separators that are tried in addition to "." or ",".
+# Thousands separators that are tried in addition to "." and ",".
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# Pattern of a date, clock time or percentage. Such a cell is no number, but does not show a wrong separator.
+# Pattern of a date, clock time or percentage. Such a cell is no number, but is no sign of a wrong separator either.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-# Characters of a line that is drawn between rows or around a table.
+# Characters of lines that are drawn between rows or around a table.
 _RULE: Final = "-=+|:_ \t"
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
 def split_cells(line: str, separator: str | None) -> list[str]:
-    """Split a line into its cells, without outer blanks and quotes; a separator inside quotes is part of its cell.
+    """Split a line into its cells, without outer blanks and quotes; a separator inside quotes belongs to its cell.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def is_skipped(line: str) -> bool:
 
 
 def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
-    """Return the number in a cell, or None; unlike Python's float, refuse words (``nan``) and underscores.
+    """Return the number in a cell, or None; unlike Python's float, reject words (``nan``) and underscores.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
 
 
 def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
-    """Return True if a cell contains a number. The value is not computed, because this is called for many cells."""
+    """Return True if a cell contains a number. The value is not computed, because many cells are tested."""
     return _written_number(cell, decimal, thousands) is not None
 
 

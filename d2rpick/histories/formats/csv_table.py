@@ -1,4 +1,4 @@
-"""Read tables: find the column for a name or number, and the numbers in the rows."""
+"""Read tables: find the column with a given name or number, and the numbers in the rows."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ _ROW_NUMBERS: Final = frozenset(
 
 
 def label_columns(layout: Layout, time: int) -> dict[str, int]:
-    """Return the columns other than the time by name; a repeated name gets the column number."""
+    """Return the columns other than the time, keyed by name; a repeated name gets the column number."""
     names = number_duplicates([*map(layout.channel, range(layout.trusted))], "column")
     times = {time, *find_own_times(layout)}
     return {name: column for column, name in enumerate(names) if column not in times}
 
 
 def find_own_times(layout: Layout) -> tuple[int, ...]:
-    """Return the time columns of a table that lists curves side by side (x, y, x, y); () for other tables."""
+    """Return the time columns of a table that lists curves side by side (x, y, x, y); empty for other tables."""
     times = tuple(
         column for column in range(0, layout.trusted, 2) if is_time(layout.name(column))
     )
@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column, and notes on assumptions. If curves are side by side, use the time of the first energy.
+    """Return the time column, with notes on assumptions; of curves side by side, use the time of the first energy.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -193,23 +193,23 @@ def find_column(source: str, layout: Layout, wanted: str) -> int:
 
 
 def _note_unsure_columns(layout: Layout) -> str:
-    """Return the note on a header with more or fewer names than columns."""
+    """Return the note on a header that has more or fewer names than there are columns."""
     problem = f"the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes such files)"
     return f"{problem}: only the first {layout.trusted} columns are sure to have their own name and are used"
 
 
 def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
-    """Return numbers and names of the columns that can be chosen."""
+    """Return numbers and names of the columns that the user can choose."""
     return list_names([f"{column + 1} {layout.name(column)!r}" for column in columns])
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if the first bytes of a file are text; only reading the file shows if the text is a table."""
+    """Return True if the first bytes of a file are text; only a full read shows whether the text is a table."""
     return head.startswith(UTF16) or b"\0" not in head
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves. Only a last line that has the selected columns is used."""
+    """Open text files as tables or curves. An incomplete last line is used only if it has the selected columns."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -217,7 +217,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | C
 
 
 class Table(Database):
-    """A table as a `Database` that has no parts; raises FormatError if the text is not a table or lacks a column."""
+    """A table as a `Database` without parts; raises FormatError if the text is not a table or lacks a column."""
 
     format = "csv"
     named_by_people = True
@@ -228,7 +228,7 @@ class Table(Database):
         self._begin = text.place(layout.start)
         sample = _sample_rows(text, self._begin, layout)
         self._layout = layout = add_thousands(layout, sample)
-        # Cells of the sampled rows, in which "." is the decimal sign.
+        # Cells of the sampled rows, with "." as the decimal sign.
         self._sample = sample
         if layout.decimal != "." or layout.thousands:
             self._sample = [[layout.plain(cell) for cell in row] for row in sample]
@@ -244,7 +244,7 @@ class Table(Database):
         self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        # False after a row has shown that a column is not numeric.
+        # False once a row has shown that a column is not numeric.
         self._together = True
         if not is_skipped(text.unended):
             self.complete = _is_whole_row(
@@ -261,12 +261,12 @@ class Table(Database):
         self._notes += [*notes, *left_out]
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the unit of energy in the header of a column; empty if the header contains no unit."""
+        """Return the energy unit in the header of a column; empty if the header contains no unit."""
         return check_energy_unit(self._layout.unit(self._columns[channel]))
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
-        """Notes on assumptions and omissions; complete only after the required columns were read."""
+        """Notes on assumptions and omissions; they are complete only after the required columns have been read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
 
@@ -312,7 +312,7 @@ class Table(Database):
 
     @cached_property
     def time(self) -> Samples:
-        """Times as in the file, shape (n,) [time]; raise FormatError if they are not those of one run."""
+        """Times as in the file, shape (n,) [time]; raise FormatError if they are not the times of a single run."""
         find_row = partial(find_line, self._text, self._begin, self._layout, self._time)
         times = check_one_run(
             self._values(self._time), lambda state: f"{self.source}:{find_row(state)}"
@@ -322,7 +322,7 @@ class Table(Database):
         return times
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
-        """Raise FormatError if the table has one row for each part at each time."""
+        """Raise FormatError if the table has one row per part at each time."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
@@ -379,12 +379,12 @@ class Table(Database):
         return [self._time, *(self._columns[name] for name in names)]
 
     def _values(self, column: int) -> Samples:
-        """Return a column, shape (n,); raise FormatError if a row has no number in it."""
+        """Return a column, shape (n,); raise FormatError if a row has no number in this column."""
         if column in self._failed:
             raise self._failed[column]
         if column not in self._read and self._together:
-            # The first pass over the table reads the required columns, and the columns that show a flight.
-            # The second pass over the table reads all other columns, because requests for them mostly follow.
+            # The first pass over the table reads the required columns, and the columns that indicate a flight.
+            # The second pass over the table reads all other columns, because they are usually requested next.
             quantities = [
                 position
                 for name, position in self._columns.items()
@@ -405,7 +405,7 @@ class Table(Database):
         return self._read[column]
 
     def _read_one_by_one(self, columns: Sequence[int]) -> None:
-        """Read these columns one by one; leave out, with a note, each column that lacks a number in some row."""
+        """Read these columns one by one; omit, with a note, each column that lacks a number in some row."""
         for column in columns:
             try:
                 self._keep([self._time, column])
@@ -442,7 +442,7 @@ def _is_whole_row(
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    r"""Write a table of columns (n,) under their names, each number in the fewest digits that restore it.
+    r"""Write columns of shape (n,) under their names, each number with the fewest digits that preserve it exactly.
 
     Examples
     --------

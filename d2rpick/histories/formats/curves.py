@@ -1,4 +1,4 @@
-"""Read text files that list curves one after the other, each with its own times, as postprocessors export them.
+"""Read text files that list curves one after another, each with its own times, as postprocessors export them.
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
 star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
-# A label is expected in this number of first characters of a line.
+# Number of characters at the start of a line in which a label is expected.
 _LONGEST_LABEL: Final = 1000
 # Pattern of the type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
-# Smallest number of labels above a curve: x label, y label and name of the curve; the title may be blank.
+# Smallest number of labels above a curve: x label, y label and curve name; the title may be blank.
 _FEWEST_LABELS: Final = 3
-# Largest number of digits in a number of pairs; a longer number is damaged.
+# Largest number of digits in a number of pairs; a longer number is a sign of damage.
 _MOST_DIGITS: Final = 12
 
 
@@ -60,7 +60,7 @@ class _TextCurve:
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
-    """Read a text of curves; return None if the text has another form. The first selected curve gives the times."""
+    """Read a text of curves; None if the text has another form. The first selected curve determines the times."""
     curves = _CurveText(text)
     for read in (_read_curveplot, _read_t_his, _read_dynaform, _read_xy_pairs):
         if read(curves):
@@ -69,7 +69,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State of the reader of a text of curves: the curves so far, and the label of their x axis."""
+    """State of the reader: the curves that it has read so far, and the label of their x axis."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -77,7 +77,7 @@ class _CurveText:
         self.curves: list[_TextCurve] = []
         self.x_label = self.time_unit = ""
         self.stops = ""
-        self.last = 0  # Number of the line that was read last.
+        self.last = 0  # Number of the line read last.
 
     def top(self, count: int) -> list[str]:
         """Return the first lines of the text that are neither blank nor comments."""
@@ -97,7 +97,7 @@ class _CurveText:
             yield self.last, self._text.unended
 
     def add(self, number: int, line: str) -> None:
-        """Add the pair in a line to the last curve."""
+        """Add the pair of numbers in a line to the last curve."""
         cells = line.replace(",", " ").split()
         if len(cells) != 2 or not self.curves:
             raise FormatError(
@@ -126,7 +126,7 @@ class _CurveText:
 
 
 class Curves(Database):
-    """The curves of one text as a `Database` that has no parts; its times are those of the first requested curve."""
+    """The curves in one text as a `Database` without parts; its times are those of the first requested curve."""
 
     format = "csv"
     named_by_people = True
@@ -166,7 +166,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only curve whose name means an internal energy; else raise FormatError.
+        """The only curve, or the only curve whose name means an internal energy; otherwise raise FormatError.
 
         The error lists all curves.
         """
@@ -183,7 +183,7 @@ class Curves(Database):
         return self.channels[fitting[0]]
 
     def find(self, wanted: str) -> str:
-        """Return the name of a curve given by its name or 1-based number; else a FormatError lists the curves."""
+        """Return the name of a curve given by its name or 1-based number; otherwise a FormatError lists the curves."""
         if (
             wanted.isdecimal()
             and wanted not in self.channels
@@ -203,7 +203,7 @@ class Curves(Database):
         )
 
     def channel(self, name: str) -> Samples:
-        """Return the values of one curve, shape (n,); raise FormatError if its times are not those of the run."""
+        """Return the values of one curve, shape (n,); raise FormatError if its times differ from those of the run."""
         if name not in self._curves:
             raise FormatError(f"{self.source}: no curve {name!r}, only {self._menu()}")
         if not np.array_equal(self._numbers(name, "times"), self.time):
@@ -223,7 +223,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # parse_cell returns None for a string that is not a number, and numpy turns None into NaN.
+        # parse_cell returns None for a string that is not a number, and numpy converts None into NaN.
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
@@ -236,14 +236,14 @@ class Curves(Database):
         return numbers
 
     def _menu(self) -> str:
-        """Return numbers and names of the curves to choose from."""
+        """Return numbers and names of the curves that the user can choose."""
         return list_names(
             [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
         )
 
 
 def _read_curveplot(text: _CurveText) -> bool:
-    """Read a Curveplot of LS-PrePost; return False for any other text."""
+    """Read a Curveplot file of LS-PrePost; return False for any other text."""
     word, *labels = [line.strip() for line in text.top(4)] or [""]
     if word != "Curveplot":
         return False
@@ -299,7 +299,7 @@ def _read_t_his(text: _CurveText) -> bool:
 
 
 def _remove_type(line: str) -> str:
-    """Remove the type and the factor, as in ``<TIME/0.001>``, from a label.
+    """Remove the type and the factor, such as ``<TIME/0.001>``, from a label.
 
     Examples
     --------
@@ -312,7 +312,7 @@ def _remove_type(line: str) -> str:
 
 
 def _find_unit_of_type(line: str) -> str:
-    """Return the unit of time that the factor of a label stands for; empty if the label has no factor."""
+    """Return the time unit that corresponds to the factor of a label; empty if the label has no factor."""
     match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
     factor = parse_cell(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")

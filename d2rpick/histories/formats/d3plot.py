@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.floating[Any]]
 
-# Values of the whole model, in the order in which they follow the time of a state.
+# Values of the whole model in the order in which they follow the time of a state.
 _MODEL: Final = (
     "kinetic_energy",
     "internal_energy",
@@ -46,7 +46,7 @@ _MODEL: Final = (
     "z_velocity",
 )
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
-# For each quantity: the number of values that precede it in the data of a part.
+# Number of values that precede each quantity in the data of a part.
 _OF_PARTS: Final = {
     "internal_energy": 0,
     "kinetic_energy": 1,
@@ -57,17 +57,17 @@ _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _WALL: Final = "rigid_wall_{}_force"
-# The end mark of a file is expected in this number of bytes at its end.
+# Number of bytes at the end of a file in which its end mark is expected.
 _TAIL: Final = 1 << 16
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if these first bytes are those of a d3plot or d3part; never raises."""
+    """Return True if these first bytes belong to a d3plot or d3part; never raises."""
     return detect_family(head) in ("d3plot", "d3part")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each family of files as a restart segment of the run; its first file has a header."""
+    """Open each family of files as a restart segment of the run; only the first file of a family has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")
@@ -83,7 +83,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """First words of the states of a family, ``rows`` (n, values); ``ended`` is True if each file has its end mark."""
+    """First words of the states of a family, ``rows`` (n, values); ``ended`` is True if every file has its end mark."""
 
     rows: Rows
     ended: bool = True
@@ -91,7 +91,7 @@ class _States(NamedTuple):
 
 
 class D3plot(Database):
-    """One family of files as a `Database`; parts and the whole model have the same times.
+    """One family of files as a `Database`; parts and whole model have the same times.
 
     Raises FormatError if the head cannot be read, or if the states do not match it.
     """
@@ -136,7 +136,7 @@ class D3plot(Database):
                 f"{self.source}: no {name}, there are {list_names(self.channels)}; ask for one of these"
             )
         index = self.channels.index(name)
-        # The forces of rigid walls follow the values of the parts.
+        # In a state, the forces of rigid walls follow the values of the parts.
         of_parts = self._head.part_values * len(self.parts) if index >= GLOBALS else 0
         return self._column(1 + index + of_parts)
 
@@ -154,7 +154,7 @@ class D3plot(Database):
         )
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of some parts, shape (n, len(ids)); a momentum is the mass times the velocity.
+        """Return a quantity of some parts, shape (n, len(ids)); momentum is computed as mass times velocity.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class D3plot(Database):
 
 
 def _read_states(files: Sequence[Source], head: Head) -> _States:
-    """Read the first words of all states of a family; in its first file the states begin after the header."""
+    """Read the first words of all states of a family; in the first file, the states follow the header."""
     real = head.form.real
     values = 1 + head.globals
     contents = [make_content(file.data) for file in files]
@@ -197,7 +197,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         max(0, len(content) - begin) // head.state
         for content, begin in zip(contents, begins, strict=True)
     ]
-    # Number of states up to the end of each file.
+    # Cumulative number of states at the end of each file.
     ends = np.cumsum(counts).tolist()
     heads = np.empty((ends[-1], values * real.itemsize), np.uint8)
     first_words_after = [
@@ -218,7 +218,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        # Usually each file is complete and needs no check of its own.
+        # If each file is complete, as usual, no file needs a check of its own.
         return _States(rows)
     states_of_files = []
     for file, begin, piece, word in zip(
@@ -234,10 +234,10 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
 
 
 def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
-    """Return True if times are finite and ascend in each file; ``ends`` counts the states up to each file end."""
+    """Return True if times are finite and ascend in each file; ``ends`` are cumulative state counts of the files."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    # A restart may write a state again at the start of a file.
+    # After a restart, a file may begin with a state that an earlier file already contains.
     ascends[[end - 1 for end in ends if 0 < end < time.size]] = True
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
@@ -276,7 +276,7 @@ def _check_states(
 
 
 def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
-    """Return the note on a file that does not end with its end mark."""
+    """Return the note on a file without an end mark at its end."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
     return (
@@ -285,12 +285,12 @@ def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
 
 
 def _is_blank(content: Content, begin: int, size: int) -> bool:
-    """Return True if a range of a file contains only zeros, with which a solver pads the file."""
+    """Return True if a range of a file contains only zeros, which solvers use to pad a file."""
     return not content[begin : begin + min(size, _TAIL)].strip(b"\0")
 
 
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
-    """Raise FormatError if the end mark of a file lies inside a state, which shows that the state length is wrong."""
+    """Raise FormatError if the end mark of a file lies inside a state, because the state length is then wrong."""
     first = max(begin, len(content) - _TAIL)
     tail = content[first : len(content)]
     mark = np.array(END, head.form.real).tobytes()
@@ -305,7 +305,7 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
 
 
 def _note_missing_files(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Return a note on the missing numbers in the file names of a family."""
+    """Return a note on gaps in the numbering of the files of a family."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
     ]

@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 _WITH_MATERIAL_TYPES: Final = (5, 7)
 _WITH_ROADS: Final = (6, 7, 9)
 WITH_RIGID_BODIES: Final = (8, 9)
-# Number of words that the sections of additional nodes contain for each element, by element type.
+# Number of words that the sections of additional nodes contain per element, keyed by element type.
 _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # Length of the section of numbers before its ids [words].
-# Length of the head of the section of numbers if it also lists part ids [words].
+_NUMBERING: Final = 10  # Length of the numbering section before its ids [words].
+# Length of the head of the numbering section if the section also lists part ids [words].
 _PART_NUMBERING: Final = 16
-# Length of a title [bytes], which does not depend on the word width.
+# Length of a title [bytes], which does not depend on the word size.
 _TITLE: Final = 72
 _RUN_TITLE: Final = 90_000
 _PART_TITLES: Final = 90_001
 _KEYWORDS: Final = 90_100
 _OTHER_TITLES: Final = (90_002, 90_020)
-_KEYWORD: Final = 80  # Length of a line of keywords [bytes].
+_KEYWORD: Final = 80  # Length of a keyword line [bytes].
 _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles; they are skipped one after the other.
+    """The sections between the control words and the titles; they are skipped one after another.
 
     ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
     the order of their definition; empty if the file has none. The other attributes count the values in a state.
@@ -55,7 +55,7 @@ class Geometry:
         self._airbag_geometry = self._left_nodes = 0
 
     def pass_over(self) -> None:
-        """Skip all sections, one after the other."""
+        """Skip all sections, one after another."""
         self._material_types()
         self.at += self._control["ialemat"]
         self._sph_flags()
@@ -71,7 +71,7 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Read ``count`` integers from the file, and advance; raise FormatError if one of them is negative."""
+        """Read ``count`` integers from the file, and move on; raise FormatError if one of them is negative."""
         counts = self._words.integers(self.at, count)
         if min(counts) < 0:
             raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")
@@ -79,13 +79,13 @@ class Geometry:
         return counts
 
     def _material_types(self) -> None:
-        """Skip the material types; count the shells of rigid parts, for which a state has no values."""
+        """Skip the material types; count the shells of rigid parts, for which a state contains no values."""
         if self._control["ndim"] in _WITH_MATERIAL_TYPES:
             self.rigid_shells, materials = self._next(2)
             self.at += materials
 
     def _sph_flags(self) -> None:
-        """Skip the flags of SPH; count the values of a particle."""
+        """Skip the SPH flags; count the values of a particle."""
         if self._control["nmsph"] <= 0:
             return
         begin = self.at
@@ -120,7 +120,7 @@ class Geometry:
         self.at += count_dimensions(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
-        # The start of the section of numbers shows where the additional nodes are.
+        # The start of the numbering section shows where the additional nodes are.
         follows = not more_nodes or self._begins_numbering(
             self.at + more_nodes + shells
         )
@@ -129,7 +129,7 @@ class Geometry:
         self._numbering()
 
     def _begins_numbering(self, word: int) -> bool:
-        """Return True if the section of node and element numbers begins at a given word."""
+        """Return True if the section of node and element numbers begins at the given word."""
         width = self._words.form.width
         if not self._words.has(word * width, _NUMBERING * width):
             return False
@@ -147,7 +147,7 @@ class Geometry:
         self.at += size
 
     def _ids(self, head: tuple[int, ...], size: int) -> tuple[tuple[int, ...], ...]:
-        """Read the ids of the parts, sorted and as defined, from a section of numbers of ``size`` words."""
+        """Read the part ids, sorted and in the order of definition, from a numbering section of ``size`` words."""
         form = self._words.form
         count = self._control["nmmat"]
         long = self._control["filetype"] >= LONG_IDS
@@ -185,7 +185,7 @@ class Geometry:
             self.at += 4 * segments
 
     def _extra_nodes(self) -> None:
-        """Skip the additional nodes of elements of higher order."""
+        """Skip the additional nodes of higher-order elements."""
         control = self._control
         kinds = dict(_EXTRA_NODES)
         if control["quadr"]:
@@ -198,14 +198,14 @@ class Geometry:
 
 
 class Titles:
-    """The titles after the geometry; ``at`` is the byte after the titles, where the states may begin."""
+    """The titles after the geometry; ``at`` is the offset after the titles, where the states may begin [byte]."""
 
     def __init__(self, words: Words, at: int) -> None:
         self._words, self.at = words, at
         self.of_run, self.of_parts = "", dict[int, str]()
 
     def read(self) -> None:
-        """Read all titles; raise FormatError if the geometry does not end here."""
+        """Read all titles; raise FormatError if the geometry ends elsewhere."""
         width = self._words.form.width
         if not self._words.has(self.at, width):
             self._words.bytes(self.at, width)
@@ -219,7 +219,7 @@ class Titles:
                 self.at += width
 
     def _section(self) -> bool:
-        """Read the section of titles that begins here; return False if another section begins here."""
+        """Read the title section that begins here; return False if another section begins here."""
         (kind,), width = self._integers(1), self._words.form.width
         if kind == _RUN_TITLE:
             self.of_run = clean_text(self._words.bytes(self.at + width, _TITLE))
@@ -242,6 +242,6 @@ class Titles:
         return True
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Return this number of integers without advancing in the file."""
+        """Return the given number of integers without moving on in the file."""
         integers = self._words.bytes(self.at, count * self._words.form.width)
         return tuple(np.frombuffer(integers, self._words.form.integer).tolist())

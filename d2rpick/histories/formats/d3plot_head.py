@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 # Number of values of the whole model: kinetic, internal and total energy, and three velocity components.
 GLOBALS: Final = 6
 
-# Value in place of the number of parts in files that femzip packed.
+# Value that replaces the number of parts in files packed by femzip.
 _FEMZIP: Final = 76_893_465
-# Largest ``maxint`` with which a state lists deleted elements instead of deleted nodes.
+# Largest control word ``maxint`` at which a state lists deleted elements instead of deleted nodes.
 _BY_ELEMENT: Final = -10_000
 # First release whose states contain the position of a rigid wall next to its force.
 _WITH_WALL_PLACES: Final = 971.0
 
-# Number of thermal values of a node by flag: temperatures of one or three layers, and heat flux.
+# Number of thermal values of a node, keyed by flag: temperatures of one or three layers, and heat flux.
 _THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 
 
@@ -111,14 +111,14 @@ def read_d3plot_head(content: Content, source: str) -> Head:
 
 
 def _count_parts(control: Mapping[str, int]) -> int:
-    """Return the number of parts. Older files give a number for each kind of element."""
+    """Return the number of parts. Older files give a separate number for each kind of element."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )
 
 
 def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
-    """Return the ids of the parts in the order of their values.
+    """Return the part ids in the order of the part values.
 
     A file of parts that are numbered consecutively has no list of their ids; the titles have their ids too.
     """
@@ -130,7 +130,7 @@ def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ..
 
 
 def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, str]:
-    """Return the number of quantities of a part (7, fewer in older files), or 0 with the reason."""
+    """Return the number of quantities of a part (7, or fewer in older files), or 0 with the reason."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
         return (
@@ -146,7 +146,7 @@ def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, s
 
 
 def _count_walls(values: int, parts: int, of_part: int, words: Words) -> int:
-    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if it is ambiguous.
+    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if the number is ambiguous.
 
     Releases with a name (R9 and later) are newer than 971, although the number in their files is 960.
     """
@@ -202,7 +202,7 @@ def _count_words_of_node(control: Mapping[str, int]) -> int:
 
 
 def _count_deletion_words(control: Mapping[str, int]) -> int:
-    """Count the words that mark deleted elements or nodes."""
+    """Count the words that mark deleted elements or nodes in a state."""
     if control["maxint"] <= _BY_ELEMENT:
         return (
             abs(control["nel8"]) + control["nelt"] + control["nel4"] + control["nel2"]

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-# Number that marks the end of the geometry, of the titles, and of the states of each file.
+# Number that marks the end of the geometry, of the titles, and of the states in each file.
 END: Final = -999999.0
 HEAD: Final = 512  # Length of the control words if a word has 8 bytes [bytes].
-# Number of control words in any file; ``extra`` is the number of additional control words.
+# Number of control words in any file; the control word ``extra`` gives the number of additional ones.
 CONTROL: Final = 64
 
 _PLACES: Final = {
@@ -34,8 +34,8 @@ _PLACES: Final = {
     "nel27": 66, "nel21p": 68, "nel15t": 69, "nel20t": 71, "nel40p": 72, "nel64": 73, "quadr": 74, "cubic": 75,
     "penout": 78, "engout": 79,
 }  # fmt: skip
-_SIGNED: Final = ("nel8", "maxint")  # Control words whose sign is a flag.
-# Index of the word that contains the name of the release; the release number follows.
+_SIGNED: Final = ("nel8", "maxint")  # Control words whose sign is used as a flag.
+# Index of the word that contains the name of the release; the next word contains the release number.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
 LONG_IDS: Final = 1000  # Number that is added to the file type if ids have 8 bytes.
@@ -43,24 +43,24 @@ _DIMENSIONS: Final = range(2, 10)
 
 
 class Form(NamedTuple):
-    """The number format of a file: the bytes of a word, and their order as a character of `struct`."""
+    """The number format of a file: the bytes per word, and the byte order as a character of `struct`."""
 
     width: int
     order: str
 
     @property
     def real(self) -> np.dtype[Any]:
-        """Type of a real number."""
+        """Numpy type of a real number."""
         return np.dtype(f"{self.order}f{self.width}")
 
     @property
     def integer(self) -> np.dtype[Any]:
-        """Type of an integer."""
+        """Numpy type of an integer."""
         return np.dtype(f"{self.order}i{self.width}")
 
 
 def detect_form(head: bytes) -> Form | None:
-    """Return the number format of a file with these first bytes; None if it is neither a d3plot, d3thdt nor d3part."""
+    """Return the number format of a file with these first bytes; None if it is not a d3plot, d3thdt or d3part."""
     for form in (Form(width, order) for width in (4, 8) for order in "<>"):
         if len(head) < CONTROL * form.width:
             continue
@@ -90,7 +90,7 @@ class Words:
         self._content, self.form, self.source = content, form, source
 
     def control(self) -> dict[str, int]:
-        """Return the control words by name; words that an older file lacks are 0."""
+        """Return the control words, keyed by name; a word that an older file lacks is 0."""
         words = self.integers(0, CONTROL)
         length = CONTROL + max(0, words[_PLACES["extra"]])
         words += self.integers(
@@ -112,11 +112,11 @@ class Words:
 
     @property
     def is_named(self) -> bool:
-        """True if the name of the release begins with R (R920, R12); older releases have only a number."""
+        """True if the name of the release begins with R (R920, R12); older releases are only numbered."""
         return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
 
     def version(self) -> str:
-        """Return the solver and the name of the release, such as LS-DYNA R920. Older files contain no name."""
+        """Return solver name and release, such as LS-DYNA R920. Older files contain no release name."""
         name = clean_text(self.bytes(_RELEASE * self.form.width, 4))
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
@@ -126,14 +126,14 @@ class Words:
         return tuple(np.frombuffer(data, self.form.integer).tolist())
 
     def ends_at(self, at: int) -> bool:
-        """Return True if an end mark begins at this byte."""
+        """Return True if an end mark begins at the byte offset ``at``."""
         data = self._content[at : at + self.form.width]
         if len(data) < self.form.width:
             return False
         return bool(np.frombuffer(data, self.form.real)[0] == END)
 
     def has(self, at: int, size: int) -> bool:
-        """Return True if the file has at least ``size`` bytes after byte ``at``."""
+        """Return True if the file has at least ``size`` bytes from the offset ``at`` on."""
         return at + size <= len(self._content)
 
     def damaged(self, content: str) -> FormatError:
@@ -142,7 +142,7 @@ class Words:
         return FormatError(f"{self.source}: it has {content}; {cure}")
 
     def bytes(self, at: int, size: int) -> bytes:
-        """Return ``size`` bytes that start at byte ``at``; raise FormatError if the file ends before."""
+        """Return ``size`` bytes from the offset ``at``; raise FormatError if the file ends earlier."""
         if at < 0 or size < 0 or not self.has(at, size):
             problem = f"{self.source}: the file has {len(self._content)} bytes, its head goes on beyond them"
             raise FormatError(f"{problem}; it is cut or damaged, copy it again")
@@ -150,5 +150,5 @@ class Words:
 
 
 def count_dimensions(control: Mapping[str, int]) -> int:
-    """Return the number of coordinates of a node; a control word above 3 contains flags too."""
+    """Return the number of coordinates of a node; a control word above 3 also contains flags."""
     return min(control["ndim"], 3)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if these first bytes are those of a d3thdt; never raises."""
+    """Return True if these first bytes belong to a d3thdt; never raises."""
     return detect_family(head) == "d3thdt"
 
 

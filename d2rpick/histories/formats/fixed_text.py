@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
     Fields = NDArray[np.bytes_]
 
-_RECENT: Final = 12  # This number of recent layouts is tried before a block is parsed.
+_RECENT: Final = 12  # Number of recent block layouts tried before parsing a block.
 # Upper limit for the length of the first line of a block [bytes].
 _LINE: Final = 1 << 10
 
 
 class Blocks(Database):
-    """Base class for a `Database` that reads a text file of blocks; it finds the complete states.
+    """Base class for a `Database` that reads a text file of blocks; the class finds the complete states.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # Positions of differing bytes are stored only for at least this number of equal blocks, to save memory.
+    # Smallest number of equal blocks for which the positions of differing bytes are stored, to save memory.
     many = 64
-    # Number of printed numbers that are converted at once, which fit into the processor's cache.
+    # Number of printed numbers that are converted at once; they fit into the processor's cache.
     batch = 1 << 14
 
     def __init__(
@@ -85,7 +85,7 @@ class Blocks(Database):
         self._data = make_content(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        # The sequences are stored in packed form, so that a file whose blocks all differ does not fill the memory.
+        # The sequences are stored in packed form, so that a file with many different blocks does not fill the memory.
         self._runs = array("q")
         data = self._data
         # The function below must not refer to self, because a reference cycle would keep the file open.
@@ -94,12 +94,12 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # True after a request has compared a part of each block.
+        # True once a request has compared a part of each block.
         self._trusted = False
-        # Bits that vary between the blocks of a long sequence of equal blocks, by the start of the sequence.
+        # Bits that vary between the blocks of a long sequence of equal blocks, keyed by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
         self._asked_ahead = tuple(ahead)
-        # Numbers copied as printed from the blocks of a long sequence of equal blocks, by the start of the sequence.
+        # Numbers copied as printed from a long sequence of equal blocks, keyed by the start of the sequence.
         self._ahead: dict[int, Fields] = {}
         self._walk()
         if not self._compared and not self._is_even():
@@ -120,7 +120,7 @@ class Blocks(Database):
     def numbers(
         self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()
     ) -> Samples:
-        """Return the named numbers of all states, shape (states, len(names)).
+        """Return the named numbers in all states, shape (states, len(names)).
 
         ``anchors`` are, for each number, the field or line from which on the text is compared before the number is
         trusted; they are used in files that were not compared in full when they were opened.
@@ -132,14 +132,14 @@ class Blocks(Database):
         """
         is_checked = self._compared or not anchors
         if not is_checked and (self._trusted or not self._alike(names, anchors)):
-            # A second request is usually followed by more requests, so all blocks are compared once.
+            # A second request is usually followed by further requests, so all blocks are compared once.
             self._compare_in_full(names)
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
         if tuple(names) == self._asked_ahead:
             # The copied numbers are used only once, because the caller keeps the result.
             taken, self._ahead = self._ahead, taken
-        # The system allocates the memory of zeros only when it is written.
+        # The operating system allocates the memory of zeros only when it is written.
         values = np.zeros((self.states, len(names)))
         is_scattered = np.ones(self.states, bool)
         row = 0
@@ -149,7 +149,7 @@ class Blocks(Database):
             if run.start in self._varied:
                 self._read(values[rows], run, offsets, taken.get(run.start))
                 is_scattered[rows] = False
-            else:  # The offsets are written to the array first, and replaced by the numbers below.
+            else:  # The offsets are stored in the array first, and replaced by the numbers below.
                 np.add(
                     _compute_starts(run, 0, run.repeats),
                     offsets,
@@ -166,7 +166,7 @@ class Blocks(Database):
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Use the incomplete last block of a file as a state if it has these numbers and a line after them."""
+        """Use the incomplete last block of a file as a state if it contains these numbers and a further line."""
         if self.rest is None:
             return
         offsets = [
@@ -184,7 +184,7 @@ class Blocks(Database):
         )
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read can begin: at the newest state with the third-to-last printed time.
+        """Return the place where a later read can begin: the newest state with the third-to-last printed time.
 
         The states after it tell whether the last one is complete, and which of those with the same printed time is the
         newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not complete.
@@ -206,7 +206,7 @@ class Blocks(Database):
         return {self.source: ResumePoint(head, begin, end)}
 
     def text(self, start: int, size: int) -> bytes:
-        """Return ``size`` bytes at an offset, up to the end of the last complete line."""
+        """Return ``size`` bytes at an offset, limited to the end of the last complete line."""
         return self._data[start : min(start + size, self._end)]
 
     def _read(
@@ -232,14 +232,14 @@ class Blocks(Database):
             values[begin:end, moving] = numbers.reshape(end - begin, -1)
 
     def _decoded(self, addresses: Addresses) -> Samples:
-        """Return the numbers at these offsets; a field that is not a number gives NaN."""
+        """Return the numbers at the given offsets; NaN for a field that is not a number."""
         fields = self._data.fields(addresses, self._grammar.width)
         return parse_fortran_numbers(
             fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError with the line of the first value, shape (states, len(names)), that is not a number."""
+        """Raise FormatError, with its line, for the first of the values (states, len(names)) that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return
@@ -255,7 +255,7 @@ class Blocks(Database):
         )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:
-        """Return the sequence of equal layouts that contains a state, and the index of the state in it."""
+        """Return the sequence of equally laid out blocks that contains a state, and the index of the state in it."""
         for run in self:
             if state < run.repeats:
                 return run, state
@@ -277,7 +277,7 @@ class Blocks(Database):
     # The methods below find the blocks of the file.
 
     def _walk(self) -> None:
-        """Find all sequences of blocks; leave out incomplete blocks."""
+        """Find all sequences of blocks, without incomplete blocks."""
         self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
@@ -314,7 +314,7 @@ class Blocks(Database):
         return previous.last in layout.fields
 
     def _leave_out(self, block: Stretch, is_last: bool) -> None:
-        """Leave out an incomplete block, and add a note about it."""
+        """Omit an incomplete block, and add a note about it."""
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a restart segment of the run"
@@ -424,12 +424,12 @@ class Blocks(Database):
     def _alike_in(
         self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
     ) -> bool:
-        """Return True if all blocks of one sequence equal their example, as `_alike` does for all sequences."""
+        """Return True if all blocks of one sequence equal their example, as `_alike` tests for all sequences."""
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        # The character after the last number is compared too.
+        # The character after the last number is compared, too.
         end = int(offsets.max()) + self._grammar.width + 1
         text = layout.literal[first:end]
         return (
@@ -438,7 +438,7 @@ class Blocks(Database):
         )
 
     def _is_even(self) -> bool:
-        """Return True if all blocks except the last have the same size, and resemble each other at both file ends."""
+        """Return True if all blocks except the last have the same size, and the blocks at both file ends are alike."""
         runs = list(self)
         if not runs:
             return True
@@ -481,5 +481,5 @@ def _compute_starts(run: Stretch, first: int, end: int) -> Addresses:
 
 
 def _name_field(name: Hashable) -> str:
-    """Return the name of a field for a message."""
+    """Return the name of a field for use in a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Label of the energy of springs, a part of the internal energy that is always needed and thus read in advance.
+# Label of the energy of springs, which is always needed and is therefore read in advance.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
-# The header and the first state lie in this number of bytes at the start of a file.
+# Number of bytes at the start of a file that contain the header and the first state.
 _NEAR: Final = 4096
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
-# The last line of a state in every known glstat; mass scaling may add lines after it.
+# The last line of a state in all known glstat files; mass scaling may add lines after it.
 _LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-# Pattern of a value. Each rigid wall has a separate line, with the number of the wall after the value.
+# Pattern of a value. Each rigid wall has a line of its own, with the number of the wall after the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
 # Pattern of the variable text in other lines: numbers, and the element that controls the time step.
@@ -68,7 +68,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
 
 
 class Glstat(Blocks):
-    """One glstat file; a ``Database`` that has no parts.
+    """One glstat file, as a ``Database`` without parts.
 
     A last state within which the file ends is used if it has the lines that are ``needed``. Raises FormatError if
     there is neither a head nor a state, or if a time is not a number.
@@ -84,7 +84,7 @@ class Glstat(Blocks):
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        # A missing line is reported when its values are requested.
+        # A missing line is reported later, when its values are requested.
         with suppress(FormatError):
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
@@ -96,7 +96,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # The value is False if a state lacks a line that other states have.
+        # False if a line is missing in some states but present in others.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -124,7 +124,7 @@ class Glstat(Blocks):
         return dict(zip(names, map(freeze, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
-        """Return the labels of all lines with values, except the time."""
+        """Return the labels of all lines with values, except that of the time."""
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}
@@ -139,7 +139,7 @@ class Glstat(Blocks):
 def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
-    """Return the offsets of a block's values by label, and its last label; a truncated value has the offset UNSURE."""
+    """Return the offsets of a block's values, keyed by label, and its last label; UNSURE for a truncated value."""
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
@@ -164,7 +164,7 @@ def _describe_glstat_block(
 
 
 def _has_last_line(layout: BlockLayout) -> bool:
-    """Return True if a block has the last line of a state."""
+    """Return True if a block has the line that ends a state."""
     return _LAST in layout.fields
 
 

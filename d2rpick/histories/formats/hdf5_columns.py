@@ -28,18 +28,18 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-# Starts of the names of groups without histories: index trees of PyTables, references of MATLAB.
+# First characters of the names of groups without histories: PyTables index trees, MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-# A table without column names is read only if it has at most this number of columns.
+# Largest number of columns of a table without column names that is still read.
 _WIDEST: Final = 64
 
-# Largest share of the file for which a dataset is copied; a view would keep the whole file in memory.
+# Largest dataset that is copied, as a fraction of the file [-]; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
 class Column(NamedTuple):
-    """One column of an HDF5 file: the ``path`` by which a user names it, and its position in the file.
+    """One column of an HDF5 file: the ``path`` by which a user names the column, and its position in the file.
 
     ``field`` is the member of a compound dataset, ``place`` the (axis, index) of the column in a matrix.
     """
@@ -58,7 +58,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the name of the column means a time; for ``time/value`` the name is ``time``."""
+        """True if the name of the column means a time; the name in ``time/value`` is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -70,7 +70,7 @@ class Column(NamedTuple):
         return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
-        """Return the values of the column, shape (size,), from the file's ``content``; all must be finite."""
+        """Return the values of the column, shape (size,), from the ``content`` of the file; all must be finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
@@ -89,7 +89,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if data of a dataset are missing, which h5py reads as zeros, or if their type is damaged."""
+    """Raise FormatError if the type of a dataset is damaged, or if data are missing, which h5py reads as zeros."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
@@ -117,7 +117,7 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError for number types that HDF5 does not define, because a damaged type changes all numbers."""
+    """Raise FormatError for number types that HDF5 does not define; a damaged type would change all numbers."""
     for kind in _list_number_types(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _list_standard_types()):
             raise FormatError(
@@ -127,7 +127,7 @@ def _check_type(dataset: h5py.Dataset, source: str) -> None:
 
 
 def _list_number_types(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
-    """Yield the types of the numbers in a type, which may be composed of others."""
+    """Yield the number types in a data type, which may be composed of several types."""
     import h5py
 
     if isinstance(kind, h5py.h5t.TypeCompoundID):
@@ -144,7 +144,7 @@ def _list_number_types(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
 
 @cache
 def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
-    """Return the integer and floating-point types that HDF5 defines."""
+    """Return the integer types and floating-point types that HDF5 defines."""
     import h5py
 
     names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
@@ -156,7 +156,7 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
-    """Return the numbers of a dataset; a contiguous one that fills most of the file is a view of ``content``."""
+    """Return the numbers of a dataset; a large contiguous dataset is returned as a view of ``content``."""
     # Data in chunks or in other files have no offset in this file.
     start = dataset.id.get_offset()
     if start is None:
@@ -184,7 +184,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    # These groups have a layout with its own reader, which reads the groups completely.
+    # These groups have a layout with a reader of its own, which reads them completely.
     read_groups: list[str] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -238,7 +238,7 @@ def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Yield the columns of a matrix along the axis that has one title for each column, or else the shorter axis."""
+    """Yield the columns of a matrix along the axis that has one title per column, or else along the shorter axis."""
     rows, width = dataset.shape
     if rows == width:
         return
@@ -257,7 +257,7 @@ def _list_matrix_columns(
 
 
 def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
-    """Yield the columns of a time history of ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
+    """Yield the columns of a time history in ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
 
     ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the
     entities. Only quantities of one component are columns. Columns of entities other than the model have the number
@@ -274,7 +274,7 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    # Path of the variable; the name of the zone, such as ZONE1, is removed.
+    # Path of the variable, without the name of the zone (such as ZONE1).
     variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
@@ -314,7 +314,7 @@ def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
 def _list_compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
-    """Yield a column for each member of a compound type, or for each component; pandas names them in an attribute."""
+    """Yield a column for each member of a compound type or each component; pandas names them in an attribute."""
     if len(dataset.shape) != 1:
         return
     base = name.removesuffix("/table")
@@ -337,7 +337,7 @@ def _list_compound_columns(
 
 
 def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Yield the columns of a frame in the "table" store."""
+    """Yield the columns of a data frame in the "table" store of pandas."""
     info = bytes(_read_attribute_text(group.attrs.get("info")), "utf-8")
     match = _PICKLED_INDEX_NAME.search(info)
     index_name = match[1].decode() if match else "index"
@@ -345,7 +345,7 @@ def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _list_frame_columns(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Yield the columns of a frame in the "fixed" store: the index, and blocks of columns of one type."""
+    """Yield the columns of a data frame in the "fixed" store of pandas: the index, and blocks of one type."""
     index = group["axis1"]
     yield from _list_index_column(name, index)
     for number in range(int(group.attrs["nblocks"])):
@@ -371,7 +371,7 @@ def _list_frame_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Yield the index and the values of a series."""
+    """Yield the index and the values of a pandas series."""
     values = group["values"]
     yield from _list_index_column(name, group["index"])
     if values.dtype.kind in "iuf" and values.ndim == 1:
@@ -379,9 +379,9 @@ def _list_series_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _list_index_column(name: str, index: h5py.Dataset) -> Iterator[Column]:
-    """Yield the index of a frame or series, if it consists of numbers."""
+    """Yield the index of a data frame or series, if it consists of numbers."""
     title = _read_attribute_text(index.attrs.get("name"))
-    # "N." is the pickled form of None.
+    # The pickled form of None is "N.".
     title = "index" if title in ("", "N.") else title
     if index.dtype.kind in "iuf" and index.ndim == 1:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
@@ -395,7 +395,7 @@ _PANDAS: Final = {
 
 
 def _read_attribute_text(value: object) -> str:
-    """Return an attribute as text, regardless of its type; empty if it is not text."""
+    """Return an attribute as text, whatever its type; empty if it is not text."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):
@@ -404,7 +404,7 @@ def _read_attribute_text(value: object) -> str:
 
 
 def _split_titles(value: object) -> list[str]:
-    """Return the names in an array of strings, or in one string with commas."""
+    """Return the names in an array of strings, or in one string separated by commas."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
         return [_read_attribute_text(entry) for entry in value.tolist()]
     text = _read_attribute_text(value)

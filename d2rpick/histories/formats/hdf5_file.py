@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # A message lists at most this number of columns.
+_MANY: Final = 12  # Largest number of columns that a message lists.
 _BRANCHES: Final = ("glstat", "matsum")
 # Exceptions that h5py raises for a damaged file.
 _DAMAGED: Final = (
@@ -60,7 +60,7 @@ _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 # Time-out of a read, in addition to 1 s per 100 kB [s]. A longer read means a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
 _SLOWEST: Final = 100_000  # Slowest expected reading speed [bytes/s].
-_USER_BLOCK: Final = 512  # Number of bytes that MATLAB puts before the HDF5 content.
+_USER_BLOCK: Final = 512  # Number of bytes that MATLAB writes before the HDF5 content.
 
 
 def recognises(data: bytes) -> bool:
@@ -69,7 +69,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
-    """Open each file as a restart segment. Selected columns take precedence over branches of a saved binout."""
+    """Open each file as a restart segment. Selected columns take precedence over the branches of a saved binout."""
     return [_open_leg(source, selection) for source in sources]
 
 
@@ -87,7 +87,7 @@ def _open_leg(source: Source, selection: Selection) -> Database:
 
 
 def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; return {} for a file of another layout."""
+    """Open the glstat and matsum branches that lasso-python saved; empty for a file of another layout."""
     with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
@@ -99,7 +99,7 @@ def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout, by their paths; a `Database` that has no parts."""
+    """The columns of an HDF5 file of any layout, keyed by path, as a `Database` without parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -132,7 +132,7 @@ class Columns(Database):
 
     @cached_property
     def time(self) -> Samples:
-        """Values of the time column, shape (n,) [time]; raise FormatError if they are not those of one run."""
+        """Values of the time column, shape (n,) [time]; raise FormatError if they are not the times of a single run."""
         path = self._time_column.path
         times = check_one_run(
             self._load(self._time_column),
@@ -181,7 +181,7 @@ class Columns(Database):
             )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the stored types of the times and of these columns."""
+        """Return the precisions of the stored number types of the times and of these columns."""
         energies = [
             _find_named_column(name, self._columns, self.source) for name in names
         ]
@@ -209,7 +209,7 @@ class Columns(Database):
 
 
 class SavedBinout(Database):
-    """A binout saved by lasso-python: channels of its glstat branch, parts of its matsum branch."""
+    """A binout saved by lasso-python: the channels of its glstat branch, and the parts of its matsum branch."""
 
     format = "hdf5"
 
@@ -284,7 +284,7 @@ class PartGroup(Database):
         return values[:, [part_ids.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
-        """Return the dataset ``name`` in this ``shape``; axes of length 1 may be missing."""
+        """Return the dataset ``name`` in this ``shape``; axes of length 1 may be missing in the file."""
         dataset = group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
@@ -315,7 +315,7 @@ def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
 
 
 def _read_line(group: h5py.Group, name: str) -> str:
-    """Return a string that was saved as an array of one element; an empty string if nothing was saved."""
+    """Return a string that was saved as an array of one element; empty if nothing was saved."""
     if name not in group:
         return ""
     values = np.ravel(group[name][()])
@@ -326,7 +326,7 @@ def _read_line(group: h5py.Group, name: str) -> str:
 
 
 def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Column:
-    """Return the column with this path; raise FormatError, with a similar path if there is one."""
+    """Return the column with this path; otherwise raise FormatError, with a similar path if there is one."""
     matching = [column for column in columns if column.path == path.strip("/")]
     near = ""
     if not matching:
@@ -382,7 +382,7 @@ def _choose_only_column(
 
 
 def _import_library(source: str) -> None:
-    """Import h5py before a process is forked, so that it is imported once; raise FormatError if it is not installed."""
+    """Import h5py before a process is forked, so that it is imported only once; raise FormatError if it is missing."""
     try:
         import_module("h5py")
     except ImportError:
@@ -439,7 +439,7 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
-    """Raise FormatError if the size of a file differs from the size in its header."""
+    """Raise FormatError if the size of a file differs from the size stated in its header."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -459,7 +459,7 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
 
 
 def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
-    """Return the first bytes of a file and its size [byte]."""
+    """Return the first bytes of a file, and its size [bytes]."""
     file.seek(0)
     head = file.read(2 * _USER_BLOCK)
     return head, file.seek(0, os.SEEK_END)

@@ -14,9 +14,9 @@ from d2rpick.histories.names import is_unit, normalise_name
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-_SHORT: Final = 60  # A message quotes at most this number of characters of a line.
-# The first columns of OpenRadioss' th_to_csv in every version of this program.
-# In some versions, the number of names differs from the number of columns (OpenRadioss/Tools, issue 98).
+_SHORT: Final = 60  # Largest number of characters of a line that a message quotes.
+# First columns in the output of OpenRadioss' th_to_csv, in every version of that program.
+# In some versions of th_to_csv, there are more or fewer names than columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
         "time",
@@ -36,7 +36,7 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-# Number of columns used, time and first value, if another program wrote more names than columns.
+# Number of columns used (time and first value) if another program wrote more names than columns.
 _SURE_WITHOUT: Final = 2
 
 
@@ -52,7 +52,7 @@ class Header(NamedTuple):
 def read_header(
     where: str, lines: Sequence[str], separator: str | None, columns: int
 ) -> Header:
-    """Read the lines above the rows of a table with this number of ``columns``.
+    """Read the lines above the rows of a table that has the given number of ``columns``.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def read_header(
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        # In files of 3DEXPERIENCE the third name is the name of the curve.
+        # In files from 3DEXPERIENCE, the third name is the name of the curve.
         title = " ".join(filter(None, names[2:]))
         sure = None
     return Header(tuple(names), units, title, sure)
@@ -119,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names, from the last row upwards, until all names differ; return [] if one row is enough.
+    """Join rows of names, from the last row upwards, until all names differ; empty if one row is enough.
 
     Examples
     --------
@@ -147,14 +147,14 @@ def _join_names(upper: str, lower: str) -> str:
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return one name per column, and drop empty cells at the end; [] if there are too few or too many names."""
+    """Return one name per column, without empty cells at the end; empty if there are too few or too many names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat each name in the empty cells after it, which a spreadsheet had merged with it; do not repeat a time."""
+    """Repeat each name, except a time, in the empty cells after it, which a spreadsheet had merged with it."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -178,7 +178,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Split a header line into names, which may contain single blanks; a line that does not fit is one title."""
+    """Split a header line into names, which may contain single blanks; a line that does not match is one title."""
     if separator is not None:
         return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -191,7 +191,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Return the names in the last comment line, as numpy.savetxt writes it, if they name each column and a time."""
+    """Return the names in the last comment line, as written by numpy.savetxt, if they name each column and a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-# Text at the beginning of a d3hsp and of a messag.
+# Text at the beginning of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
 # Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
-# If both signs are a comma, rows can be read only if their numbers are in quotes.
+# If separator and decimal sign are both a comma, rows can be read only if their numbers are in quotes.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
 )
 
-# Pattern of the line ``sep=;`` that spreadsheets write above a table; the separator is no part of a number.
+# Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator cannot be part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# The first row is expected in these numbers of lines, in up to three attempts.
+# Number of lines in which the first row is expected at the first attempt.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -65,7 +65,7 @@ class Layout(NamedTuple):
 
     @property
     def trusted(self) -> int:
-        """Number of columns that may be used, counted from the first one."""
+        """Number of columns that may be used, counted from the first column."""
         return self.columns if self.sure is None else self.sure
 
     def number(self, cell: str) -> float | None:
@@ -83,18 +83,18 @@ class Layout(NamedTuple):
         return name or f"column {column + 1}"
 
     def channel(self, column: int) -> str:
-        """Return the name of a column, after the title of its curve if there is one."""
+        """Return the name of a column, preceded by the title of its curve if there is one."""
         return f"{self.name(column)}: {self.title}" if self.title else self.name(column)
 
     def unit(self, column: int) -> str:
-        """Return the unit of a column in the file, or an empty string if the file has none."""
+        """Return the unit of a column in the file; empty if the file contains none."""
         if self.units:
             return self.units[column].strip("()[]")
         return find_unit(self.names[column]) if self.names else ""
 
 
 def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
-    """Add a number to names that occur more than once, as "IE (column 2)".
+    """Add the column number to names that occur more than once, such as "IE (column 2)".
 
     Examples
     --------
@@ -144,7 +144,7 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator that ``rows`` prove, if some of their cells are numbers only with this separator."""
+    """Add the thousands separator proved by ``rows``, in which some cells are numbers only with this separator."""
     odd = [
         cell
         for row in rows
@@ -157,21 +157,24 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
 
 
 def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
-    """Return the error for a text that contains no table; the error quotes the first likely row, or the first line."""
+    """Return the error for a text that contains no table; the error quotes the first likely row or the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
     ]
     rows = [(number, line) for number, line in numbered if line.lstrip()[0].isdigit()]
     number, line = next(iter(rows or numbered), (1, ""))
     below = "below" if text.is_short else f"in the first {HEAD} lines"
-    problem = f"{text.name}:{number}: {quote_start(line)} was found, and no rows of at least two numbers {below}"
+    found = f"{text.name}:{number}: {quote_start(line)} was found"
+    problem = f"{found}, and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
     if rows and has_number(line.strip(), ".", ""):
-        cure = "this file has one column; add the times"
-    elif _LISTING_OF_LS_DYNA in line:
-        cure = (
-            "this is a listing of LS-DYNA; give the glstat, matsum or binout of the run"
+        problem = (
+            f"{text.name}:{number}: only one column, {quote_start(line)}, was found"
         )
+        cure = "add a column with the times"
+    elif _LISTING_OF_LS_DYNA in line:
+        problem = f"{text.name}:{number}: this is a listing of LS-DYNA"
+        cure = "give the glstat, matsum or binout of the run"
     return FormatError(f"{problem}; a table of time and energy was expected; {cure}")
 
 
@@ -243,8 +246,8 @@ def _find_rows(
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return for each cell of a row if it is a number or missing; an empty tuple if the line is not a row."""
-    # Most lines have only one cell, because most separators that are tried are wrong.
+    """Return, for each cell of a row, whether it is a number or missing; empty if the line is not a row."""
+    # Most lines have only one cell, because most of the separators tried are wrong.
     if len(cells) < 2:
         return ()
     written = [form.number(cell) is not None for cell in cells]
@@ -272,7 +275,7 @@ def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
 def _refuse_odd_rows(
     source: str, lines: Sequence[str], first: int, table: Layout
 ) -> None:
-    """Raise FormatError if a line above the rows begins with a number, because this line is not a header."""
+    """Raise FormatError if a line above the rows begins with a number, because such a line is not a header."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:
@@ -285,7 +288,7 @@ def _refuse_odd_rows(
 
 
 def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
-    """Raise FormatError for rows like ``0,05,1,25``, in which integers with leading zeros are decimal places."""
+    """Raise FormatError for rows such as ``0,05,1,25``, in which integers with leading zeros are decimal places."""
     if table.separator != ",":
         return
     for number, line in enumerate(

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
-_TABLES: Final = range(4, 8)  # Record types of symbol tables and their entries.
+_TABLES: Final = range(4, 8)  # Record types of symbol tables and of their entries.
 _LONGEST: Final = 1 << 32  # Upper limit for the length of a symbol table [bytes].
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
@@ -59,7 +59,7 @@ _AROUND: Final = 1 << 16
 # Smallest number of repetitions for which comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
-# Pattern of the names of state directories: d and the number of the state (18 digits fit an int64).
+# Pattern of the names of state directories: d and the number of the state (18 digits fit into an int64).
 _STATE: Final = re.compile(rb"(?:^|/)d(\d{1,18})$")
 
 
@@ -73,14 +73,14 @@ class Variable:
 
 
 class DirectoryLayout(NamedTuple):
-    """The variables of a directory; ``doubled`` are the names that occur more than once."""
+    """The variables of a directory; ``doubled`` contains the names that occur more than once."""
 
     variables: dict[str, Variable]
     doubled: frozenset[str]
 
 
 class _Form(NamedTuple):
-    """The records of a directory as one integer, which is quick to compare with another directory.
+    """The records of a directory as one integer, which is quick to compare with that of another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -93,7 +93,7 @@ class _Form(NamedTuple):
 
 
 class _Directory(NamedTuple):
-    """A directory while its records are read; the records begin at the byte ``start``.
+    """A directory that is being read; its records begin at the byte ``start``.
 
     ``number`` is that of the state, -1 if the directory is no state.
     """
@@ -114,7 +114,7 @@ class _Directory(NamedTuple):
 
 
 class Lsda:
-    """The directories of one file, found by reading its records.
+    """The directories in one file, found by reading the records of the file.
 
     Parameters
     ----------
@@ -169,17 +169,17 @@ class Lsda:
         self._walk(self._begin)
 
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
-        """Return values at any bytes of the file, in the shape of ``positions``."""
+        """Return the values at any byte positions of the file, in the shape of ``positions``."""
         fields = self.data.fields(positions.ravel(), dtype.itemsize)
         self.data.check()
         return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Return the number, start and layout of each state of a branch in the order of the file, shape (n, 3)."""
+        """Return number, start and layout of each state of a branch, in the order of the file, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
-        """Return where a later read can begin: at the earliest of the second-to-last states of all branches.
+        """Return the place where a later read can begin: the earliest of the second-to-last states of all branches.
 
         The head repeats the metadata of all wanted branches, each behind a change to its directory.
         """
@@ -206,7 +206,7 @@ class Lsda:
         return ResumePoint(head + self._make_change(directory), begin, len(self.data))
 
     def _make_change(self, path: str) -> bytes:
-        """Return the record of a change to a directory, given by its absolute path."""
+        """Return the record that changes to the directory with an absolute path."""
         text = path.encode()
         return self._head.pack(self._head.size + len(text), DIRECTORY) + text
 
@@ -221,12 +221,12 @@ class Lsda:
         unpack = self._head.unpack_from
         head = self._head.size
         size, name_length = len(data), head + self._type.size
-        # Bytes around the current position, and the position of the first of them.
+        # Bytes around the current position, and the position of the first of these bytes.
         near, base = b"", 0
         directory = _Directory((), -1, position)
         records = list[bytes]()
         command = 0
-        # Start of the last state of each branch.
+        # Start of the last state of each branch, keyed by branch path.
         anchors: dict[tuple[str, ...], int] = {}
         heads: set[bytes] = set()
         while position + head <= size:
@@ -285,7 +285,7 @@ class Lsda:
         return _Directory(_resolve_path(path, text.decode()), number, end)
 
     def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
-        """Return True if the file was truncated in the record ``last_bytes``; otherwise that record is damaged.
+        """Return True if the file was truncated in the record ``last_bytes``; otherwise, that record is damaged.
 
         Records of a state have the heads of the last state, but symbol tables differ from each other.
         """
@@ -295,7 +295,7 @@ class Lsda:
         return command in _TABLES and length < _LONGEST
 
     def _leave(self, directory: _Directory, records: list[bytes]) -> None:
-        """Store the variables of the directory that ends here, if the directory is requested."""
+        """Store the variables of the directory that ends here, if the directory was requested."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
             records.pop()  # A symbol table after the variables is not part of the layout.
         branch = directory.branch
@@ -316,7 +316,7 @@ class Lsda:
             self.odd[branch].append(directory.path[-1])
 
     def _layout(self, records: list[bytes]) -> DirectoryLayout:
-        """Return the variables defined by the record headers of a directory; an invalid header defines none."""
+        """Return the variables that the record headers of a directory define; an invalid header defines none."""
         variables: dict[str, Variable] = {}
         doubled = set()
         offset = 0
@@ -347,7 +347,7 @@ class Lsda:
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
     def _same_again(self, directory: _Directory) -> _Form | None:
-        """Return the form of the branch's last state if this state has the same records, else None."""
+        """Return the form of the branch's last state if this state has the same records, otherwise None."""
         if not directory.is_state or directory.branch not in self._forms:
             return None
         form = self._forms[directory.branch][1]
@@ -379,7 +379,7 @@ class Lsda:
         }
         ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
-            if not visits:  # The file lacks this branch.
+            if not visits:  # The file does not contain this branch.
                 continue
             last_visits = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = last_visits[np.isin(last_visits[:, 1], [*growth])]
@@ -391,7 +391,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Compare records one stride apart; return True if it is worthwhile to search for repetitions."""
+        """Compare records one stride apart; return True if searching for repetitions is worthwhile."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]
@@ -458,7 +458,7 @@ def recognises(head: bytes) -> bool:
 
 
 def _resolve_path(path: tuple[str, ...], change: str) -> tuple[str, ...]:
-    """Return the path after a change to another directory.
+    """Return the path that results from a change of directory.
 
     Examples
     --------

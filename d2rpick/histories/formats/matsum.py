@@ -47,8 +47,8 @@ _AXES: Final = (
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
-_MAT: Final = "mat.#"  # Text that begins the lines of a part.
-# The part number 0 in "mat.#=    0" stands for lumped masses and their kinetic energy.
+_MAT: Final = "mat.#"  # Text at the beginning of the lines of a part.
+# Part number 0, printed as "mat.#=    0", which stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
 # Placeholder for a part number that is damaged, or too long for its columns.
 _UNREADABLE: Final = -1
@@ -71,7 +71,7 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-# Pattern of the numbers in lines that may vary between states.
+# Pattern of the numbers in those lines that may vary between states.
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
@@ -90,7 +90,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
 
 
 class Matsum(Blocks):
-    """One matsum file; a ``Database`` that has no channels of the whole model.
+    """One matsum file, as a ``Database`` without channels of the whole model.
 
     Raises FormatError if it has neither a head nor a state, or if a time is not a number.
     """
@@ -127,7 +127,7 @@ class Matsum(Blocks):
         self.notes += self._remarks(present)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return one of ``QUANTITIES`` of the parts ``ids``, shape (n, len(ids)).
+        """Return one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
 
         Raises
         ------
@@ -160,7 +160,7 @@ class Matsum(Blocks):
         return self._together.pop(wanted)
 
     def _present(self) -> Counter[int]:
-        """Count the states that have each part, in the order in which the parts appear."""
+        """Count the states that contain each part, in the order in which the parts appear."""
         states = Counter[int]()
         for run in self:
             names = self.layout(run.example, run.stride).fields
@@ -193,7 +193,7 @@ class Matsum(Blocks):
 
 
 def _read_legend(data: bytes | Content) -> dict[int, str]:
-    """Return the titles of the parts by number, in the order of the legend."""
+    """Return the titles of the parts, keyed by number, in the order of the legend."""
     first_state = data.find(b"\n" + _START)
     match = _LEGEND.search(
         data[: min(first_state, _LONGEST) if first_state >= 0 else _LONGEST]
@@ -203,7 +203,7 @@ def _read_legend(data: bytes | Content) -> dict[int, str]:
 
 
 class PartColumns(NamedTuple):
-    """Energies and momenta of one part to be written, all of the same shape (n,)."""
+    """Energies and momenta of one part for writing, all of the same shape (n,)."""
 
     title: str
     internal_energy: Samples
@@ -213,7 +213,7 @@ class PartColumns(NamedTuple):
 
 
 def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
-    """Write a matsum of parts, numbered from 1, with five significant digits; ``time`` is (n,)."""
+    """Write a matsum of parts, numbered from 1, with five significant digits; ``time`` has shape (n,)."""
     legend = "".join(
         f"{number:9d}     {part.title:<70}\n"
         for number, part in enumerate(parts, start=1)
@@ -258,7 +258,7 @@ def _describe_matsum_block(
     lines: Sequence[re.Match[bytes]],
     literal: Bytes,
 ) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
-    """Return the offsets of a block's numbers by part and name, and its last name; UNSURE for a truncated number."""
+    """Return the offsets of a block's numbers, keyed by part and name, and its last name; UNSURE if truncated."""
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
     doubled = False
@@ -282,7 +282,7 @@ def _describe_matsum_block(
 
 
 def _find_part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
-    """Read the part number from ``text``, which begins with the number.
+    """Read the part number at the beginning of ``text``.
 
     A single overflowed number is the only number of the legend that is too wide; several could not be told apart.
     """

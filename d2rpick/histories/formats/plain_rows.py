@@ -1,4 +1,4 @@
-"""Read uniform rows of numbers at once; the result equals that of `float` with any pandas version."""
+"""Read uniform rows of numbers at once; the results equal those of `float`, whatever the pandas version."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _UNIT_SEPARATOR: Final = "\x1f"  # A control character that occurs in no table.
-# Largest relative error of the fast number parser of pandas, which counts leading zeros as digits.
+# Largest relative error of the fast number parser of pandas, which counts leading zeros as digits [-].
 _ROUNDED: Final = 1e-9
 
 
@@ -42,10 +42,10 @@ def read_plain_rows(
     separator_bytes = (layout.separator or "\n").encode("latin-1")
     closed = piece[: piece.index(b"\n")].endswith(separator_bytes)
     if layout.separator and (closed or sorted(used) != read_columns):
-        # In all other cases the parser checks that each row has its cells.
+        # In all other cases, the parser itself checks that no row lacks cells.
         if not _has_all_cells(piece, layout):
             return None
-        # The first column is read too, because it shows comments.
+        # The first column is read too, because comments appear in it.
         read_columns = sorted({0, *used})
         if closed or len(read_columns) < layout.columns:
             chosen = read_columns
@@ -64,7 +64,7 @@ def read_plain_rows(
 
 
 def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
-    """Replace the separators of rows with only quoted cells by a control character; return None for other rows."""
+    """Replace the separators of rows with only quoted cells by a control character; None for other rows."""
     if layout.separator is None:
         return None
     between = f'"{layout.separator}"'.encode("latin-1")
@@ -124,7 +124,7 @@ def _read_with_pandas(
 
 
 def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples | None:
-    """Parse rows of numbers exactly with scipy; return None if scipy fails or disagrees with the fast result ``fast``.
+    """Parse rows of numbers exactly with scipy; None if scipy fails or contradicts the fast result ``fast``.
 
     Scipy reads them as a matrix file with one number a line. It ignores what follows a number in its line, so its
     result is compared with ``fast``, shape (rows, columns), which are the numbers to some nine digits.
@@ -146,7 +146,7 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
 
 
 def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Return True if all rows have the right number of cells and either all or none end with a separator."""
+    """Return True if all rows have the right number of cells, and either all or none end with a separator."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     ends = signs == ord("\n")

@@ -1,4 +1,4 @@
-"""Read the records of Radioss time histories in both containers: binary, and the text of ``/TFILE/3``.
+"""Read the records of Radioss time histories in both file types: binary, and the text of ``/TFILE/3``.
 
 A binary record is its length, its bytes and its length again, all big-endian. A record of text begins with a line
 ``ZZZZZEOR`` that gives its numbers of integers (I), characters (C) and reals (R); lines of fixed columns follow: ten
@@ -34,17 +34,17 @@ _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
 _LONG, _SHORT = 10, 5  # Number of columns of an integer in the two text formats.
-# Fortran prints these characters in place of a number that is too long.
+# Fortran prints these characters in place of a number that is too long for its field.
 _STARS: Final = b"*" * _SHORT
-# Upper limit for the length of a header record, apart from its integers [bytes].
+# Upper limit for the length of a header record, without its integers [bytes].
 _ROOM: Final = 1024
-# Number of characters of the run title in text files (80 in binary files).
+# Number of characters of the run title in text files (binary files have 80).
 _RUN_TITLE: Final = 72
 # Number of columns of a real number; the decimal point is in the fourth column.
 _REAL: Final = 16
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
-# Number of times at the end of a file from which the precision is determined.
+# Number of time values at the end of a file that are used to determine the precision.
 _JUDGED: Final = 100
 
 
@@ -77,7 +77,7 @@ def open_records(data: Content, source: str) -> Records:
 
 
 class Records:
-    """The layout of the records in a binary file; ``at`` is the offset of the next header record."""
+    """The layout of the records in a binary file; ``at`` is the offset of the next header record [bytes]."""
 
     width = WIDTH  # Size of a number in a state [bytes].
 
@@ -85,7 +85,7 @@ class Records:
         self._data, self.at = data, at
 
     def take(self) -> bytes | None:
-        """Return the next header record and advance; None if there is no complete record."""
+        """Return the next header record, and move on; None if there is no complete record."""
         begin = self.at + WIDTH
         if begin > len(self._data):
             return None
@@ -99,26 +99,26 @@ class Records:
         return self._data[begin:end]
 
     def size(self, count: int) -> int:
-        """Return the bytes of a record with ``count`` reals."""
+        """Return the number of bytes of a record with ``count`` reals."""
         return (count + 2) * WIDTH
 
     def place(self, number: int) -> int:
-        """Return the offset of a real, counted from 0, in its record [byte]."""
+        """Return the offset of a real in its record [bytes]; reals are counted from 0."""
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return offset and bytes of the length marks in every record with ``count`` reals."""
+        """Return the offset and the bytes of the length marks in every record with ``count`` reals."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
         """Decode bytes of shape (n, width) as reals of shape (n,); NaN for bytes that are not a number."""
-        # A NaN is refused later, unless the value is not used.
+        # A NaN causes an error later, but only if the value is used.
         with np.errstate(invalid="ignore"):
             return fields.view(">f4").ravel().astype(np.float64)
 
     def digits(self, times: Samples) -> int:  # noqa: ARG002  the subclass uses the argument
-        """Return the significant decimal digits of the reals."""
+        """Return the number of significant decimal digits of the reals."""
         return DIGITS[WIDTH]
 
 
@@ -152,7 +152,7 @@ class _TextRecords(Records):
     def _packed(
         self, body: bytes, first: int, characters: int, last: int
     ) -> bytes | None:
-        """Return a record of a text file in binary form; None if its content does not match its first line."""
+        """Return a record of a text file in binary form; None if its content contradicts its first line."""
         if not characters:
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
@@ -188,12 +188,12 @@ class _TextRecords(Records):
 
     def values(self, fields: Bytes) -> Samples:
         values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
-        # A number with shifted or missing characters can often still be parsed.
+        # A number with shifted or missing characters can often still be parsed, so columns 3 and 4 are checked.
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
 
     def digits(self, times: Samples) -> int:
-        """Return the digits of single precision if all times are single-precision numbers, else of the text."""
+        """Return the digits of single precision if all times are single-precision numbers, else those of the text."""
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()
@@ -212,7 +212,7 @@ def split_integers(record: bytes) -> tuple[int, ...]:
 
 
 def _pack_integers(text: bytes, count: int, width: int) -> bytes:
-    """Pack ``count`` integers of ``width`` columns. Asterisks replace a material or property id and become 1, not 0."""
+    """Pack ``count`` integers of ``width`` columns; asterisks, which replace a material or property id, become 1."""
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
-# Possible lengths of all titles but the run title, from older to newer formats [bytes].
+# Possible lengths of all titles except the run title, from older to newer formats [bytes].
 _TITLES: Final = (
     40,
     80,
@@ -47,7 +47,7 @@ _TITLES: Final = (
 )
 
 # Global variables in the order of the file.
-# A file has the first 12 up to version 2024, the first 16 in version 2025, and all 22 since version 2026.
+# A file has the first 12 variables up to version 2024, the first 16 in version 2025, and all 22 since version 2026.
 _GLOBALS: Final = (
     "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum", "mass", "time_step",
     "rotation_energy", "external_work", "spring_energy", "contact_energy", "hourglass_energy",
@@ -55,7 +55,7 @@ _GLOBALS: Final = (
     "added_mass", "percentage_added_mass", "inlet_mass", "outlet_mass", "inlet_energy", "outlet_energy",
 )  # fmt: skip
 
-# Part variables that d2rpick uses, by their code in the file.
+# Part variables that d2rpick uses, keyed by their code in the file.
 _PART_VARIABLES: Final = {
     1: "internal_energy", 2: "kinetic_energy", 3: "x_momentum", 4: "y_momentum", 5: "z_momentum", 6: "mass",
     7: "hourglass_energy", 9: "x_center", 10: "y_center", 11: "z_center", 21: "rotational_internal_energy",
@@ -63,10 +63,10 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-# Kind of a group of nodes, whose displacements have the variable codes below.
+# Kind of a group of nodes; the codes of its displacement variables follow.
 _NODES: Final = 0
 _DISPLACEMENTS: Final = (1, 2, 3)
-# Kinds of groups with contact forces, whose normal and tangential impulses have the variable codes below.
+# Kinds of groups with contact forces; the codes of their normal and tangential impulses follow.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
@@ -95,7 +95,7 @@ class _Head(NamedTuple):
     version: str
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
-    # Index of a part's variable among the variables of all parts.
+    # Index of each part variable among the variables of all parts.
     columns: dict[tuple[int, str], int]
     counts: tuple[int, ...]  # Number of values in each record of a state.
     groups: tuple[_Group, ...]  # Groups with histories, whose records end each state.
@@ -130,7 +130,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
 
 
 class TimeHistory(Database):
-    """One time history file as a `Database`; parts and the whole model have the same times.
+    """One time history file as a `Database`; parts and whole model have the same times.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class TimeHistory(Database):
 
     @cached_property
     def digits(self) -> int:  # type: ignore[override]  # a property overrides a field
-        """Significant decimal digits of all numbers."""
+        """Number of significant decimal digits of all numbers."""
         return self._records.digits(self.time)
 
     @cached_property
@@ -195,7 +195,7 @@ class TimeHistory(Database):
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]  # a property overrides a field
-        """Numbers of the nodes with written displacements (card /TH/NODE)."""
+        """Numbers of the nodes whose displacements are written (card /TH/NODE)."""
         return tuple(self._displacement_columns)
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
@@ -206,7 +206,7 @@ class TimeHistory(Database):
 
     @cached_property
     def _displacement_columns(self) -> dict[int, tuple[int, list[int]]]:
-        """For each node: the index of the record with its displacements, and their three columns in the record."""
+        """Index of the record with the displacements of each node, and their three columns in that record."""
         places: dict[int, tuple[int, list[int]]] = {}
         for record, group in self._list_groups():
             if group.kind == _NODES and {*_DISPLACEMENTS} <= {*group.variables}:
@@ -222,7 +222,7 @@ class TimeHistory(Database):
         return enumerate(groups, start=len(self._begins) - len(groups))
 
     def _force_of(self, record: int, group: _Group, member: int) -> ContactForce:
-        """Return the force of one interface or rigid wall of a group, from its normal and tangential impulses."""
+        """Return the force of one interface or rigid wall in a group, from its normal and tangential impulses."""
         number, title = group.named[member]
         triples = [codes for codes in _IMPULSES if {*codes} <= {*group.variables}]
         first = member * len(group.variables)
@@ -235,7 +235,7 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return where a later read of the file can begin: at the second-to-last complete state."""
+        """Return the place where a later read of the file can begin: the second-to-last complete state."""
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
@@ -257,7 +257,7 @@ class TimeHistory(Database):
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:
-        """Return the index of a part's variable in the record of the parts; raise FormatError if it is missing."""
+        """Return the index of a part variable in the record of the parts; raise FormatError if it is missing."""
         column = self._head.columns.get((id_, quantity))
         if column is None:
             quantities = [name for part, name in self._head.columns if part == id_]
@@ -271,7 +271,7 @@ class TimeHistory(Database):
         return column
 
     def _columns(self, record: int, columns: Sequence[int]) -> Samples:
-        """Return the selected numbers of one record of each state, shape (n, columns)."""
+        """Return the selected numbers from one record of each state, shape (n, columns)."""
         offsets = [
             self._begins[record] + self._records.place(column) for column in columns
         ]
@@ -281,7 +281,7 @@ class TimeHistory(Database):
         return self._records.values(fields).reshape(self._states, len(columns))
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
-        """Return the offsets [byte] of the numbers in the first ``states`` states, shape (states * offsets,)."""
+        """Return the offsets of the numbers in the first ``states`` states, shape (states * offsets,) [bytes]."""
         return np.add.outer(
             self._records.at + self._stride * np.arange(states),
             np.array(offsets, np.int64),
@@ -326,13 +326,13 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """Reads the records of the header of a time history one after the other."""
+    """Reads the header records of a time history, one after another."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        # Length of the titles [bytes], equal in all records; 0 until the first title is read.
+        # Length of the titles, equal in all records [bytes]; 0 until the first title is read.
         self._title = 0
 
     def head(self) -> _Head:
@@ -380,7 +380,7 @@ class _HeadRecords:
     def _parts(
         self, count: int
     ) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
-        """Read the parts: id, title, subset, material, property and number of variables; then read the variables."""
+        """Read the parts (id, title, subset, material, property and number of variables), and then the variables."""
         described: dict[int, Part] = {}
         columns: dict[tuple[int, str], int] = {}
         values = 0
@@ -430,7 +430,7 @@ class _HeadRecords:
         return _Group(kind, elements, names, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:
-        """Read a record that contains a title and this number of integers."""
+        """Read a record that contains a title and the given number of integers."""
         record = self._next(WIDTH * numbers + self._title if self._title else None)
         self._title = len(record) - WIDTH * numbers
         if self._title not in _TITLES:
@@ -448,7 +448,7 @@ class _HeadRecords:
         return number
 
     def _next(self, length: int | None = None) -> bytes:
-        """Read the next record; raise FormatError if it is incomplete, or has an unexpected length."""
+        """Read the next record; raise FormatError if the record is incomplete or has an unexpected length."""
         record = self._records.take()
         if record is None:
             raise self._broken("a complete record")

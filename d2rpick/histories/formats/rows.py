@@ -1,4 +1,4 @@
-"""Read the numbers in the rows of a table. Uniform rows are read in large pieces, other rows line by line."""
+"""Read the numbers in the rows of a table. Uniform rows are read in large blocks, other rows line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table in the requested order, and notes on lines below the table that were left out."""
+    """Columns (rows,) of a table in the requested order, and notes on ignored lines below the table."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -70,7 +70,7 @@ def find_line(
 def _read_tables(
     text: Text, begin: int, curve: _Curve
 ) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Yield line numbers and values (rows, used) of each piece; rows that differ in form are read line by line."""
+    """Yield line numbers and values (rows, used) of each block of rows; irregular rows are read line by line."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = read_plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
@@ -106,11 +106,11 @@ class _Curve:
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
         self._name = name
-        self._before: float | None = None  # Time of the last state.
+        self._before: float | None = None  # Time of the last state [time].
         self._gap = self._ended = False
-        # States of the earlier pieces, an array for each piece.
+        # States of the earlier blocks of rows, one array per block.
         self._read: list[Samples] = []
-        # States read from the current piece so far.
+        # States read so far from the current block of rows.
         self._current: list[list[float]] = []
         self._below: _Below | None = None
         # Number of states of the table that are repeated below the table.
@@ -120,7 +120,7 @@ class _Curve:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on lines below the table that were left out."""
+        """Notes on ignored lines below the table."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -131,18 +131,18 @@ class _Curve:
         return (f"{omitted} and were left out",)
 
     def add(self, table: Samples) -> None:
-        """Store the states (rows, used) of a piece that was read at once."""
+        """Store the states (rows, used) of a block of rows that was read at once."""
         self._read.append(table)
         self._gap, self._before = False, float(table[-1, 0])
 
     def keep_piece(self) -> None:
-        """Store the states of a piece that was read line by line."""
+        """Store the states of a block of rows that was read line by line."""
         if self._current:
             self._read.append(np.array(self._current))
             self._current.clear()
 
     def stops_before(self, time: float) -> bool:
-        """Return True if a state at this time belongs to another curve, or is below the table."""
+        """Return True if a state at this time belongs to another curve, or lies below the table."""
         starts_again = self._gap and self._before is not None and time <= self._before
         return self._ended or starts_again or self._below is not None
 
@@ -235,7 +235,7 @@ class _Curve:
 
 
 def _split_row(where: str, row: str, layout: Layout) -> list[str]:
-    """Split a row into its cells; raise FormatError for a second header or another number of cells."""
+    """Split a row into its cells; raise FormatError for a second header or an unexpected number of cells."""
     cells = split_cells(row, layout.separator)
     if len(cells) == layout.columns + 1 and not cells[-1]:
         cells.pop()

@@ -25,12 +25,12 @@ _UTF8: Final = b"\xef\xbb\xbf"
 # Number of lines from which encoding, separator and header of a text are determined.
 HEAD: Final = 10_000
 
-# Pattern of a number, with groups for the digits before and after the decimal point, and the exponent.
+# Pattern of a number, with groups for the digits before and after the decimal point, and for the exponent.
 _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
-# Number of significant digits that restore every double.
+# Number of significant digits that preserve every double.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# Number of significant digits from which a format is treated as lossless; a double keeps all numbers of 15 digits.
+# Smallest number of digits of a lossless format; a double preserves all numbers with 15 digits.
 _FULL = 15
 
 
@@ -40,34 +40,34 @@ class Text:
     A large file in plain ASCII stays on disk. Raises FormatError for binary data and for a line that is too long.
     """
 
-    # The numbers below limit how many lines and bytes are read at once.
+    # The constants of this class limit how many lines and bytes are read at once.
     # Number of lines from which encoding, separator and header of the text are determined.
     top = HEAD
-    # Size of a piece, whose cells fit into the processor's cache [bytes].
+    # Number of bytes that are read at once, so that their cells fit into the processor's cache.
     piece = 1 << 17
-    # Largest text of which all fields are used to find the printed precision [bytes].
+    # Largest size of a text of which all fields are used to determine the printed precision [bytes].
     short = 1 << 16
     # Number of lines that are sampled at the start, at the end and in between of a longer text.
     some = 100
-    # Size of a piece of a large text [bytes]; it is large because each call of pandas or scipy costs milliseconds.
+    # Number of bytes of a large text that are read at once; it is high, because each call of pandas costs milliseconds.
     large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last line that has a line end [byte].
+        # Offset after the last line that has a line end [bytes].
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first complete lines; the layout of the text is determined from them."""
+        """The first complete lines, from which the layout of the text is determined."""
         return self._first[: self.top]
 
     @property
     def is_short(self) -> bool:
-        """The value is True if ``head`` contains all lines, apart from an unterminated last line."""
+        """True if ``head`` contains all lines except an unterminated last line."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -75,23 +75,23 @@ class Text:
         return list(islice(self.lines(0), self.top + 1))
 
     def place(self, line: int) -> int:
-        """Return the offset of a line, counted from 0 [byte]; the end of the last line if there are fewer lines."""
+        """Return the offset of a line, counted from 0 [bytes]; the end of the last line if there are fewer lines."""
         address = 0
         for _ in range(line):
             address = self._data.find(b"\n", address) + 1 or self._end
         return address
 
     def take_rest(self) -> None:
-        """Mark the unterminated last line as a complete line."""
+        """Treat the unterminated last line as a complete line."""
         self._end = len(self._data)
 
     @property
     def is_large(self) -> bool:
-        """True if the file stays on disk while it is read; only plain ASCII files do."""
+        """True if the file stays on disk while it is read; this is possible only for plain ASCII files."""
         return isinstance(self._data, OnDisk)
 
     def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
-        """Yield the complete lines after byte ``begin``, in pieces of many lines; ``large`` gives larger pieces.
+        """Yield the complete lines after byte ``begin``, in blocks of many lines; ``large`` selects larger blocks.
 
         Raises FormatError after the last piece if the file was rewritten meanwhile.
         """
@@ -100,7 +100,7 @@ class Text:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
             if not end and begin + size < self._end:
-                size *= 2  # A single line is longer than the piece.
+                size *= 2  # A single line is longer than the block.
                 continue
             yield piece[:end] or piece + b"\n"
             begin += end or len(piece)
@@ -112,7 +112,7 @@ class Text:
             yield from self.rows(piece)
 
     def rows(self, piece: bytes) -> list[str]:
-        """Return the lines of a piece, without their ends."""
+        """Return the lines of a block of text, without their line ends."""
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
@@ -186,7 +186,7 @@ def _is_plain(data: bytes) -> bool:
 
 
 def _detect_encoding(data: bytes) -> str:
-    """Return "ascii" or "utf-8" if the data are valid in it, else "latin-1", which accepts any bytes."""
+    """Return "ascii" or "utf-8" if the data are valid in this encoding, else "latin-1", which accepts any bytes."""
     if data.isascii():
         return "ascii"
     try:
@@ -238,7 +238,7 @@ def find_precisions(
 
 
 def is_whole_field(field: str, above: Sequence[str]) -> bool:
-    """Return True if the fields above it show that the last field of a truncated file is complete.
+    """Return True if the last field of a truncated file is complete, judging by the fields above it.
 
     The field is complete if the column has a format of constant length: always the same number of decimals (two or
     more) and of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never write. An
@@ -291,20 +291,20 @@ def _count_significant_digits(field: str) -> int:
 
 
 def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the number of decimals that all fields without an exponent share; None if they differ."""
+    """Return the number of decimals that all fields without an exponent share; None if the numbers differ."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
     return decimals if are_alike else None
 
 
 def _decimals(field: str) -> int:
-    """Return the number of decimals of a number that has no exponent; any other field gives 0."""
+    """Return the number of decimals of a number without exponent; 0 for any other field."""
     parts = _PARTS.fullmatch(field)
     return len(parts[2]) if parts and parts[3] is None else 0
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equally spaced and their step needs fewer decimals than ``decimals``."""
+    """Return True if the times are equally spaced with a step that needs fewer decimals than ``decimals``."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
