@@ -696,11 +696,16 @@ def _read(
         rest=np.zeros(grid.time.size),
     )
     held = sum(stretch.energy for stretch in stretches) / mean
+    # Heat or a drift that the first part predicts is no plastic flow, and leaves the lines as they are.
+    follows = _predicts_within(
+        _EXACT, prediction.missed, noise / prediction.swing, systematic
+    )
+    rises_steadily = follows and bool(np.all(np.diff(static) > 0))
     doubts = Doubts(
         missed=prediction.missed,
         misfit=noise / prediction.swing,
         negative=max(-share - 2 * is_mode.size * scatter / mean, 0.0),
-        drift=float(np.std(static)) / mean,
+        drift=0.0 if rises_steadily else float(np.std(static)) / mean,
         beyond=_measure_beyond_bounds(reading, grid),
         harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
         unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)) * bool(stretches),

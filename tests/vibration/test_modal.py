@@ -99,12 +99,13 @@ def test_a_mode_slower_than_the_record_is_no_static_energy(
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
 
 
-@pytest.mark.parametrize("drift", [0.1, 0.5])
+@pytest.mark.parametrize("drift", [0.1, 0.5, 3.0])
 def test_an_energy_that_drifts_is_no_slow_mode(drift: float) -> None:
     structure = LinearStructure.draw(4, 3)
     energy = structure.elastic_energy(TIME)
     drifting = drift * np.ptp(energy) * TIME / TIME[-1]
     modal = require(identify_modal(TIME, energy + drifting))
+    assert modal.signed, modal.doubts
     true = structure.residual(*PAIRS)
     assert np.sqrt(np.mean((compute_residuals(modal, *PAIRS) - true) ** 2)) < 0.02
 
@@ -193,8 +194,9 @@ def test_the_kinetic_energy_does_not_decide_where_a_deformation_relaxes() -> Non
     rising = require(
         identify_modal(TIME, structure.elastic_energy(TIME) - relaxing + 40.0)
     )
-    assert not rising.signed
-    assert confirm_by_kinetic_energy(rising, kinetic) is kinetic
+    assert rising.signed, (
+        rising.doubts
+    )  # Heat rises so, and the lines stay as they are.
 
 
 @pytest.mark.parametrize("stretch", [0.3, 1.0])
