@@ -19,6 +19,7 @@ from d2rpick.deck.ls_dyna_columns import (
     make_watched_line,
 )
 from d2rpick.deck.ls_dyna_parts import (
+    OPTIONS_WITHOUT_IDS,
     DeckParts,
     SectionCard,
     name_material,
@@ -43,34 +44,10 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that can be read, because they add no integers in the columns of the ids.
-_OPTIONS: Final = {
-    *(
-        "THICKNESS",
-        "BETA",
-        "MCID",
-        "OFFSET",
-        "ORTHO",
-        "ORIENTATION",
-        "COMPOSITE",
-        "LONG",
-        "SCALAR",
-        "SCALR",
-    ),
-    *(
-        "SECTION",
-        "ELFORM",
-        "DOF",
-        "PID",
-        "WARPAGE",
-        "ELBOW",
-        "ID",
-        "TITLE",
-        "SHL4",
-        "TO",
-        "SHL8",
-        "TET4TOTET10",
-    ),
+# Options of element keywords that can be read.
+_OPTIONS: Final = OPTIONS_WITHOUT_IDS | {
+    *("SCALR", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE"),
+    *("SHL4", "TO", "SHL8", "TET4TOTET10"),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
 # Keywords that define no elements, and change neither the mass nor the cost of a part.
@@ -188,7 +165,9 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
     )
     notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
     joints = ls_dyna_loads.read_joints(deck)
-    watched = mesh.table.known(_read_watched_nodes(deck))
+    local_nodes = _read_watched_nodes(deck, local=True)
+    watched_nodes = np.union1d(_read_watched_nodes(deck, local=False), local_nodes)
+    watched = mesh.table.known(watched_nodes)
     return Inventory(
         "ls-dyna",
         _build_parts(deck, parts, mesh),
@@ -200,6 +179,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         ties=joints.unknown,
         watched=watched,
         watched_ids=mesh.table.ids[watched],
+        local_ids=frozenset(local_nodes.tolist()),
         moved=_has_moved_nodes(deck),
         files=tuple(deck.sources),
         boundary=ls_dyna_loads.read_ls_dyna_boundary(
@@ -283,12 +263,15 @@ def _list_nodes(
                 )
 
 
-def _read_watched_nodes(deck: Deck) -> Integers:
-    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title."""
+def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title.
+
+    If ``local`` is True, only those whose motion is written in a local coordinate system, else only the others.
+    """
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
-        if set(options) <= {"ID", "LOCAL"}:
+        if set(options) <= {"ID", "LOCAL"} and ("LOCAL" in options) is local:
             line = make_watched_line(card.width, 1 if options else 8)
             node_ids = [
                 lines.integers(line.layout).ravel()

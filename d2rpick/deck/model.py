@@ -34,6 +34,7 @@ _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Kinds of elements that stay deformable when their part is switched to rigid.
 DISCRETE: Final = frozenset({SPRING, "seatbelt"})
+_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
 
 class Hold(NamedTuple):
@@ -188,9 +189,6 @@ class Material(NamedTuple):
     poisson: float | None = None
 
 
-_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
-
-
 class Section(NamedTuple):
     """Section of a part: formulations by kind of element, shell thickness, beam area, spring properties.
 
@@ -236,6 +234,8 @@ class Inventory:
         Connections between unknown parts.
     watched, watched_ids : array
         Places of the nodes whose motion the run writes, and their numbers in the deck, both of shape (k,).
+    local_ids : frozenset of int
+        Numbers of the nodes whose motion is written in local axes, which may turn.
     moved : bool
         True if the deck moves nodes away from their coordinates.
     files : tuple of SourceFile
@@ -263,6 +263,7 @@ class Inventory:
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     watched_ids: Places = field(default_factory=lambda: np.empty(0, np.int64))
+    local_ids: frozenset[int] = frozenset()
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
     history_groups: frozenset[int] = frozenset()
@@ -270,6 +271,15 @@ class Inventory:
     flaws: tuple[Flaw, ...] = ()
     boundary: Boundary = NO_BOUNDARY
     left_rigid: LeftRigid | None = None
+
+    @property
+    def rigid_parts(self) -> set[int]:
+        """Ids of the parts whose material is rigid from the start."""
+        return {
+            part
+            for part, data in self.parts.items()
+            if data.material and data.material.kind == "rigid"
+        }
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, list_names
-from d2rpick.histories.contact_forces import join_contact_forces
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
 from d2rpick.histories.names import (
@@ -138,8 +137,13 @@ class Database:
         """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
+    @cached_property
+    def node_time(self) -> Samples:
+        """Times of the nodes, shape (k,) [time]."""
+        return self.time
+
     def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
-        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (k, len(ids), 3)."""
         raise FormatError(f"{self.source}: displacements of nodes are not read from it")
 
     @property
@@ -196,10 +200,10 @@ class Legs:
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
         """Return the place in each file where a later read can begin; empty if the files are read completely."""
-        points: dict[str, ResumePoint] = {}
-        for leg in self._files:
-            points |= leg.find_resume_points()
-        return points
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.resuming import join_resume_points
+
+        return join_resume_points(leg.find_resume_points() for leg in self._files)
 
     @property
     def energy_channel(self) -> str | None:
@@ -313,10 +317,15 @@ class Legs:
             common.intersection_update(leg.node_ids)
         return tuple(id_ for id_ in self._legs[0].node_ids if id_ in common)
 
+    @cached_property
+    def node_time(self) -> Samples:
+        """Times of the nodes, shape (k,) [time]."""
+        return self._joined([leg.node_time for leg in self._legs], self._nodes_kept)
+
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (k, len(ids), 3)."""
         return self._joined(
-            [leg.node_displacements(ids) for leg in self._legs], self._kept[0]
+            [leg.node_displacements(ids) for leg in self._legs], self._nodes_kept
         )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
@@ -329,6 +338,9 @@ class Legs:
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts and rigid walls that all restart segments have."""
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.contact_forces import join_contact_forces
+
         legs = [
             {force.name: force for force in leg.contact_forces} for leg in self._legs
         ]
@@ -354,6 +366,11 @@ class Legs:
     def _parts_kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Valid states of the parts, and notes on invalid states."""
         return self._order([leg.part_time for leg in self._legs])
+
+    @cached_property
+    def _nodes_kept(self) -> NDArray[np.bool_]:
+        """Valid states of the nodes."""
+        return self._order([leg.node_time for leg in self._legs])[0]
 
     def _order(
         self, times: Sequence[Samples]
