@@ -21,6 +21,7 @@ from d2rpick.vibration.doubts import (
     StaticEnergy,
     measure_doubts,
 )
+from d2rpick.vibration.hidden_energy import find_most_hidden, measure_hidden_pairs
 from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
@@ -69,7 +70,9 @@ _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
-_LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
+# _EXACT: largest error of exact modes, as a fraction of these two limits [-].
+# _SLOW_TOO: largest error at which slow modes are distinguished from other slow changes, as such a fraction [-].
+_LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
@@ -94,8 +97,6 @@ _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
-# Assumed number of lines that are hidden in the misfit.
-_HIDDEN_LINES: Final = 12
 
 
 class ModeAtTd(NamedTuple):
@@ -185,16 +186,14 @@ class ModalVibration:
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record ten times better than required."""
-        return self._predicts_within(0.1)
+        """Return True if the modes predict the record much better than required."""
+        return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
         """Return True if the error of the modes, apart from white noise, is below ``share`` of the acceptable error."""
-        white = 1 - self.systematic
-        structure = self.doubts.misfit * np.sqrt(self.systematic)
-        missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
-        most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
-        return self.signed and structure < most_left and missed < most_missed**2
+        doubts = self.doubts
+        follows = _predicts_within(share, doubts.missed, doubts.misfit, self.systematic)
+        return self.signed and follows
 
     @property
     def told(self) -> str:
@@ -360,6 +359,14 @@ class ModalVibration:
         """
         return self.half_width(tr, td) / 4
 
+    @property
+    def fallen(self) -> float:
+        """Return by how much the static energy falls in the window, relative to the mean vibration energy [-]."""
+        ends = self.time[[0, -1]]
+        level = self.reading.level_of_modes(ends)
+        static = self.reading.spectrum.mean.at(ends) - level / 2
+        return float((static[0] - static[1]) / max(np.mean(level) / 2, 1e-300))
+
     @cached_property
     def _phase_share(self) -> float:
         """Return the fraction of R^2 that depends on the phases of all modes at td [-]."""
@@ -388,19 +395,29 @@ class ModalVibration:
         """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
-        that the misfit can hide, and by the static energy itself.
+        that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
+        with slow decays, so what the first part of the record says of it is another interpretation.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
         if not (self.reading.no_static or self.is_ambiguous):
-            hidden = _find_most_hidden(self.reading.spectrum.rest)
+            hidden = find_most_hidden(self.reading.spectrum.rest)
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        if self.has_slow_mode:
+            first = self.of_first_part.residual_squared(tr, td)
+            shifts.append(first - squared)
         return (
             np.max([none, *np.negative(shifts)], axis=0),
             np.max([none, *shifts], axis=0),
         )
+
+    @cached_property
+    def has_slow_mode(self) -> bool:
+        """Return True if the energy of a mode does not complete a cycle in the window."""
+        window = float(self.time[-1] - self.time[0])
+        return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
     @property
     def is_ambiguous(self) -> bool:
@@ -447,6 +464,11 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
+    misfit = prediction.spectrum.error / prediction.swing
+    systematic = _correlate_neighbours(prediction.spectrum.rest)
+    if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
+        # What is no sum of lines, as under friction, changes slowly beside them.
+        prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
     window = float(time[0]), float(time[-1])
@@ -472,10 +494,28 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """Return True if the kinetic energy may be used because plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
+    Plastic flow and dampers add to it.  If the static energy falls instead, a deformation relaxes, which moves the
+    parts although it does not vibrate.
     """
+    if internal.fallen > _NO_STATIC:
+        return False
     held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
     needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
     return held > (1 - MOST_NEGATIVE) * needed and internal.doubts.beyond < MOST_BEYOND
+
+
+def _predicts_within(
+    share: float, missed: float, misfit: float, systematic: float
+) -> bool:
+    """Return True if the error of lines, apart from white noise, is below a ``share`` of the acceptable error.
+
+    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
+    """
+    white = 1 - systematic
+    structure = misfit * np.sqrt(systematic)
+    systematically_missed = missed**2 - 2 * white * misfit**2
+    most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
+    return bool(structure < most_left and systematically_missed < most_missed**2)
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
@@ -536,12 +576,20 @@ def _read(
         _TINY * prediction.swing,
     )
     interpretation = _choose_interpretation(
-        plain, stretches, may_be_spring=may_be_spring, kinetic=kinetic
+        plain,
+        stretches,
+        may_be_spring=may_be_spring,
+        kinetic=kinetic,
+        systematic=systematic,
     )
     reading = interpretation.best
     doubts = measure_doubts(
         reading, interpretation.static, prediction, grid, stretches, scatter
     )
+    # Heat or a drift that the first part predicts is no plastic flow, and leaves the lines as they are.
+    follows = _predicts_within(_EXACT, doubts.missed, doubts.misfit, systematic)
+    if follows and np.all(np.diff(interpretation.static.energy) > 0):
+        doubts = doubts._replace(drift=0.0)
     if kinetic:
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
     return ModalVibration(
@@ -568,11 +616,13 @@ def _choose_interpretation(
     *,
     may_be_spring: bool,
     kinetic: bool,
+    systematic: float,
 ) -> _Interpretation:
     """Choose whether lines of stretches are modes, and whether a part of the mean energy is static.
 
     In the ``plain`` reading all lines are modes and all of the mean is vibration.  ``may_be_spring`` is True if a
-    second harmonic may be that of a stiffening spring.
+    second harmonic may be that of a stiffening spring, ``systematic`` the fraction of the misfit that neighbouring
+    states have in common.
     """
     spectrum = plain.spectrum
     time = plain.times
@@ -581,6 +631,11 @@ def _choose_interpretation(
     )
     half = with_static.level_of_modes(time) / 2
     static = spectrum.mean.at(time) - half
+    if not kinetic:
+        pairs = measure_hidden_pairs(static, 2 * half, spectrum.error, systematic)
+        plain = replace(plain, hidden_pairs=pairs)
+        with_static = replace(with_static, hidden_pairs=pairs)
+        static = static - pairs * half
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
 
@@ -590,7 +645,7 @@ def _choose_interpretation(
     explains_mean = excess < _AMBIGUOUS * float(np.mean(half_of_all))
     is_ambiguous = bool(stretches) and not kinetic and explains_mean
 
-    hidden = _find_most_hidden(spectrum.rest)
+    hidden = find_most_hidden(spectrum.rest)
     unresolved = share * mean < hidden / 2
     no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
     if is_ambiguous and not all(stretch.is_exact for stretch in stretches):
@@ -623,16 +678,6 @@ def _read_first_part(
         is_mode=_mask_modes(first.lines, first_stretches),
         rest=np.zeros(grid.time.size),
     )
-
-
-def _find_most_hidden(rest: Samples) -> float:
-    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
-
-    None of them is higher than the highest line of the rest, and together they are no more than the rest.
-    """
-    highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
-    most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
-    return float(2 * _HIDDEN_LINES * min(highest, most_together))
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:

@@ -49,11 +49,13 @@ def find_described(
         Where the energy seems to keep its level [time].
     """
     windows = _list_windows(history, td, guess)
-    for window in windows:
-        described = _grow_described(history, window)
-        if described is not None:
-            return described
-    return None
+    grown = (_grow_described(history, window) for window in windows)
+    first = next((described for described in grown if described is not None), None)
+    if first is None or first.vibration.is_exact:
+        return first
+    # The end of a load at its beginning may convince, but the next window is exact then.
+    second = next(grown, None)
+    return second if second is not None and second.vibration.is_exact else first
 
 
 @remember
