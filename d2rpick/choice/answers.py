@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# Number of pairs at other energy peaks that may be found inadmissible before the search for a better pair ends.
+# The search for a better pair ends after this many pairs at other energy peaks have been found inadmissible.
 _MOST_REFUSED = 3
 
 
@@ -97,7 +97,7 @@ class PairVerdict(AnswerAtTd):
         return self._decide(self.better) if decision.grade == POOR else decision
 
     def _decide(self, better: Pair | None) -> Decision:
-        """Decide on the pair; ``better`` is a better pair, or None if no better pair is known."""
+        """Return the verdict on the pair; ``better`` is a better pair, or None if no better pair is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = () if self.admissible else self.reasons or unknown
         decision = decide(
@@ -115,7 +115,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair whose grade is not "poor", for this td or at the nearest better td; None if there is none."""
+        """A better pair whose grade is not "poor", at this td or at the nearest suitable energy peak; or else None."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
@@ -214,7 +214,7 @@ def _check_order(tr: float, td: float) -> None:
 
 
 class AcceptableWindow(NamedTuple):
-    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` is its fraction of the flight up to td."""
+    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` relates its length to the flight up to td."""
 
     start: float
     end: float
@@ -260,7 +260,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """Estimate of the motion after td if the basis is "energy"; None if the basis is another."""
+        """Estimate of the motion after td if the basis is "energy"; otherwise None."""
         if self.situation.basis != "energy":
             return None
         return estimate_time_after(
@@ -284,7 +284,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable, equally good tr if the basis is "energy"; None if the basis is another."""
+        """Windows of acceptable, equally good tr if the basis is "energy"; otherwise None."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -308,7 +308,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The better pair, if it is clearly better than the recommended pair and its residual is good; else None."""
+        """Another pair, clearly better than the recommended one and with a residual of at most 0.5; otherwise None."""
         better = self.clearly_better
         if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
             return None
@@ -324,7 +324,7 @@ class PairSuggestion(AnswerAtTd):
         return verify_at(examined, better.tr)._decide(None)
 
     def decision_on(self, candidate: Candidate) -> Decision:
-        """Decide on one of the candidates by the rules of ``verify``."""
+        """Return the verdict on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes
         limits = list_exceeded_limits(self.situation, candidate)
         messages = (excess.message for excess in limits)
@@ -342,7 +342,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair, if it is clearly better than the recommended pair; otherwise None.
+        """Another pair that is clearly better than the recommended pair; None if there is none.
 
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
@@ -407,14 +407,14 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair of the nearest energy peak that has one, within the flight; None if no peak has one.
+    """Return the recommended pair at the nearest energy peak in the flight that has one; None if no peak has one.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # If the end of the flight is unknown, times after the given td are not tried.
+    # If the end of the flight is unknown, only times up to the given td are tried.
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -440,7 +440,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair whose grade is not "poor": the recommended pair at this td or at the nearest better td."""
+    """Return a pair whose grade is not "poor": the one recommended at this td, or else a better pair at another td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -564,7 +564,7 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair (tr, td) of a reference run; ``earlier`` and the errors are those of `verify_in_history`."""
+    """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
     return _add_health(verdict, reference.run)

@@ -79,7 +79,7 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
 def print_pair(
     reference: Reference, situation: Situation, tr: float, printing: Printing
 ) -> PrintedCard | None:
-    """Print the card for ``tr`` and the td of a situation, with a verdict on both; None without parts to switch."""
+    """Print the card for ``tr`` and the td of a situation, with a verdict on both; None if no parts are switched."""
     history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation
@@ -163,7 +163,8 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # At rest, no energy level has to be matched.
+    # If the parts are at rest, no energy level has to be matched.
+    if verdict.situation.at_rest:
         return
     measures = [
         f"{name} {value:.3f}"

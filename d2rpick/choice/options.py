@@ -29,7 +29,7 @@ _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
-    """A limit that a recommended pair must keep. A pair with an unknown value does not keep the limit.
+    """A limit that a recommended pair must meet. A pair whose value is unknown does not meet the limit.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
     value must not be below the limit, otherwise not above it.
@@ -39,7 +39,7 @@ class Limit(NamedTuple):
     is_lower: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
-        """Return True for each of the ``values`` that keeps the limit; NaN is an unknown value, which does not keep it.
+        """Return True for each of the ``values`` that meets the limit; NaN is an unknown value, which does not meet it.
 
         Examples
         --------
@@ -70,7 +70,7 @@ class Limit(NamedTuple):
 
 
 class Use(NamedTuple):
-    """Commands and answers that use an option of a choice, and the limit that it sets.
+    """Commands and answers that use an option of a choice, and the limit that the option sets.
 
     ``limit`` is what its value limits, None if it is not a limit.  ``of_cards``: ``card`` and ``check --history`` have
     the option too.  ``of_sets``: ``parts`` and ``study`` have it too.  ``is_advanced``: the last section of the help

@@ -130,7 +130,7 @@ class Overview(NamedTuple):
 
     @property
     def _doubts(self) -> list[str]:
-        """Reasons why a run with flights can only be used with care."""
+        """Reasons to use a run with flights only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if not self.complete:
@@ -251,7 +251,7 @@ def _read_times(first: Legs) -> tuple[Samples, str | None]:
 def _list_notes(
     run: OpenedRun, selection: Selection, refusal: str | None
 ) -> Iterator[str]:
-    """Yield what the readers omitted or assumed, and the message ``refusal`` if the times could not be read."""
+    """Yield notes on what the readers omitted or assumed, and the message ``refusal`` if the times are unreadable."""
     yield from run.left_out
     for database in run.databases:
         yield from _read_notes(database)
@@ -395,7 +395,7 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
 def _warn_about_missing_energy(
     run: OpenedRun, selection: Selection
 ) -> Iterator[Caution]:
-    """Yield a warning if the user has to choose an internal energy, or there is none."""
+    """Yield a warning if the user has to choose an internal energy, or if there is none."""
     try:
         run.history(selection)
     except FormatError as error:
@@ -405,7 +405,7 @@ def _warn_about_missing_energy(
 def _warn_about_flights_outside(
     history: History, flights: Sequence[tuple[str, FreeFlight]]
 ) -> Iterator[Caution]:
-    """Yield a warning for each flight outside the time range of the energies, as in files of different runs."""
+    """Yield a warning for each flight outside the time range of the energies, as in files from different runs."""
     for _, flight in flights:
         last_td = flight.end - LEAST_MARGIN * (flight.end - flight.start)
         if flight.end_seen and last_td > history.end:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Relative error of vibration energies that are derived from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest number of similar modes with random phases that is assumed; a computed car had 100 such modes.
+# Largest assumed number of similar modes with random phases; a computed car model had 100 such modes.
 # The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
 # Largest relative excess of the mean energy after td over its prediction from spectral lines, in computed runs [-].

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _MOST: Final = 20_000
 # Largest growth factor of the number of td judged together, from one batch to the next [-].
 _MORE: Final = 8
-# Largest excess of the upper bound of a residual over the residual without a note on the candidate [-].
+# A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
@@ -236,7 +236,7 @@ class Judged:
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of the model with many modes that saves little because it is close to td."""
+        """True for each candidate of the model with many modes that saves hardly anything because it is close to td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))

@@ -45,11 +45,11 @@ POOR_RESIDUAL = 0.5
 # Largest plastic energy without a warning, as a fraction of the vibration energy [-]; it may be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Assumed ratio of the static to the lowest energy in flight [-], below 1 because modes rarely vanish at once.
+# Assumed ratio of the static energy to the lowest energy in flight [-]; modes rarely all have zero energy at once.
 # With _AT_REST = 0.85, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
 # With _AT_REST = 0.85, the predicted mean energies of a shell box had errors of -0.05 to 0.16.
 _AT_REST = 0.85
-# Largest expected mean energy after td relative to the reference run [-]; 1 is exceeded, as estimates are inexact.
+# Largest expected mean energy after td relative to the reference run [-]; above 1 because estimates are inexact.
 # Switching adds no energy, so a ratio above MOST_KEPT indicates a contact in the flight.
 MOST_KEPT = 1.2
 # Largest argument for which the exponential function does not overflow [-].
@@ -204,7 +204,7 @@ def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
 
 
 def _describe_early_contact(situation: Situation) -> str:
-    """Describe how much earlier the contact may come, and the last safe td."""
+    """Describe how much earlier the contact may occur, and the last safe td."""
     start, end = situation.flight.within(situation.history.time)
     early = min(situation.expected_margin.time, end - start)
     if early < end - start:
@@ -282,7 +282,7 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe the parts that move away from the others without being connected to them."""
+    """Describe the parts that move away from the others because they are not connected to them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -384,7 +384,7 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td relative to the reference run [-], if ``locked`` is locked in [energy]."""
+        """Return the mean energy after td relative to the reference run [-], if ``locked`` [energy] is locked in."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
@@ -473,7 +473,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection to all candidates for which ``holds``, shape (n,), is True.
+    """An objection that applies to each candidate for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.
@@ -619,7 +619,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate is worse than having no vibration after td."""
+    """Return the objection that a candidate's residual exceeds that of a release without any vibration."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -645,7 +645,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that a pair is worse than having no vibration after td, or than the best pair at this td."""
+    """State that the residual of a pair exceeds that of a release without vibration, or the smallest one at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-    # A function that tests times, and returns True for each time that passes the test.
+    # A function that tests times and returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
 # Number of bisections that locate the end of a window to within 1e-6 of the sampling interval.
 _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
-# Largest deviation of the error from its polyline [-]; this is half a unit of the last printed digit.
+# Largest deviation of the error from its polyline [-], which is half a unit of the last printed digit.
 _EXACT: Final = 5e-4
 # Largest number of halvings of an interval in which the error curve is not straight.
 _HALVINGS: Final = 20
@@ -119,7 +119,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count, for each time, the runs that have the time in one of their windows.
+    """Count, for each time, the runs with a window that contains the time.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def count_coverage(
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # Windows have no gap between them if one starts at the time at which another ends.
+    # There is no gap between two windows if one starts at the time at which the other ends.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching

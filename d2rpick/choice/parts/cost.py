@@ -34,7 +34,7 @@ POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Fraction of the cost of a deformable step that is due to elements, with their assembly, contact and output [-].
+# Fraction of the cost of a deformable step that is due to elements, including assembly, contact and output [-].
 ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs as the element costs.
 RIGID_NODE: Final = 0.04
@@ -124,7 +124,7 @@ class Share(NamedTuple):
 
 
 class ByDeck(NamedTuple):
-    """Sources of values from a deck: its files, and the weights (None if the user gave the cost fraction)."""
+    """Sources of the values taken from a deck: its files, and the weights (None if the user gave the cost fraction)."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None

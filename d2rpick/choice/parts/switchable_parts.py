@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest standard deviation of the energy in flight of a part that no longer deforms, relative to the mean [-].
+# A part no longer deforms if its energy in flight has at most this standard deviation, relative to the mean [-].
 STOPPED: Final = 0.1
 # Duration of the first phase of a landing, as a fraction of the preceding flight [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
 # LANDING_ALONE: smallest fraction of the energy at the start of the landing that a bumper or skid absorbs [-].
-# _CHEAP: largest fraction of the cost of all elements that a bumper or skid may have to stay deformable [-].
+# _CHEAP: largest fraction of the total element cost that a bumper or skid may have and still stay deformable [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
@@ -110,7 +110,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # The error means that no part ever deforms.
+    except FormatError as error:  # The error is raised if no part ever deforms.
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -237,7 +237,7 @@ def judge_parts(
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
-    """Judge whether each part of a deck or history can be switched; the rows are sorted by part id.
+    """Judge whether each part of a deck or history can be switched; the result is sorted by part id.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# Status of a run. A run with one of the first two values was judged.
+# Status of a run; runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -346,7 +346,7 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 
 
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
-    """Return the runs that were cut off: their files end within a state, or their records are shorter than most."""
+    """Return the runs that were cut off: their files end within a state, or their records are unusually short."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
     return [

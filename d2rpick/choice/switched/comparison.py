@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MOST_MOMENTUM_ERROR = 0.05
 # Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
-# Largest relative difference of the energy reported while rigid from the energy at td without a note [-].
+# A note is issued if the energy reported while rigid differs from the energy at td by more than this fraction [-].
 # The reported energy can differ, because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
 # _STILL: largest change of an energy that is treated as constant, relative to the energy [-].
@@ -325,7 +325,7 @@ def _check_locked_in_energy(
 ) -> Iterator[str]:
     """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # Relative to the vibration energy, an error has no meaning if nothing vibrates.
+        return  # An error relative to the vibration energy has no meaning if nothing vibrates.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:

@@ -43,9 +43,9 @@ _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance"
 _HARDLY: Final = 0.1
 # Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
-# Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
+# An internal energy whose relative change is below this is constant [-]; solvers write energies in single precision.
 SAME: Final = 1e-6
-# Largest number of output intervals after tr at which a flight that seems to begin may have begun before tr.
+# A flight that seems to begin at most this many output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
 
@@ -65,7 +65,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def landed_rigid(self) -> bool:
-        """True if the contact that ends the flight came while the parts were rigid."""
+        """True if the contact that ends the flight occurred while the parts were rigid."""
         return self.landing is not None and self.landing < self.td
 
     @property
@@ -95,7 +95,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def description(self) -> str:
-        """A sentence for the user about the outcome of the window."""
+        """Description of the outcome of the window for the user, in one sentence."""
         if self.flight is None:
             return "no flight is found there"
         if self.took_off is not None:
@@ -304,7 +304,7 @@ class _AbsentWindow(NamedTuple):
 
     @property
     def caution(self) -> Caution:
-        """Warning about the rigid parts of the window."""
+        """Warning that names the parts that were rigid during the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
             window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
@@ -346,7 +346,7 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or else all parts, that have internal energy; only those ``among`` the given, if any."""
+    """Return the chosen parts, or else all parts, that have internal energy; ``among`` restricts the choice."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()

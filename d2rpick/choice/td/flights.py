@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
-# Times at which the search for a vibration without contact starts, as fractions of the record [-].
+# Times at which the search for a contact-free vibration starts, as fractions of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-# Shortest useful rigid window, as a fraction of the record [-]; shorter ones save less than a restart costs.
+# Shortest useful rigid window, as a fraction of the record [-]; a shorter window saves less than a restart costs.
 MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
@@ -74,7 +74,7 @@ def compute_last_td(end: float, margin: float) -> float:
 
 
 def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
-    """Find all flights of a record in time order; a flight that ends with a given landing ends at that time.
+    """Find all flights of a record in time order; a flight ends at the given landing if there is one.
 
     Parameters
     ----------

@@ -39,18 +39,18 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# Number of the most promising energy peaks, and also of the last peaks, that the search for the best td tries.
+# The search for the best td tries this many of the most promising energy peaks, and as many of the last peaks.
 _MOST_PEAKS: Final = 12
 # Smallest lengths of the windows compared for many modes, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
-# Smallest relative length at which good windows are treated as equally long as the longest good window [-].
+# Good windows of at least this length, relative to the longest good window, are treated as equally long [-].
 _LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in a uniform grid; it suffices for a smooth curve on paper and on a screen.
+# Number of td values in a uniform grid; it suffices for a smooth curve on paper and on screen.
 STEPS: Final = 200
 # Number of decimals with which errors are shown to the user.
 _READ: Final = 3
-# Excess of rigid time over the recommended pair at which a pair is mentioned, as a fraction of the td range [-].
+# A pair is mentioned if it is rigid for longer than the recommended pair by this fraction of the td range [-].
 _MUCH: Final = 0.1
 # Safety factor on the uncertainty of a contact time that is estimated from the energy [-].
 # In 20 computed falls, the uncertainty was up to 1.9 times its estimate.
@@ -407,7 +407,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr, only from those long enough to be planned if there are any."""
+    """Return the pairs with the most certain tr; pairs that are too short to be planned are used only if all are."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -488,7 +488,7 @@ def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
 def _list_times_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Return the td of the smallest residuals with rigid times of at least ``share`` of the longest; empty for few td.
+    """Return td with the locally smallest residuals and at least ``share`` of the longest rigid time; empty for few td.
 
     ``bounds`` are the first td, the first tr and the last td [time].
     """
@@ -521,7 +521,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; infinity if none."""
+    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; infinity if empty."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:

@@ -46,9 +46,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Largest displayed error of another td that is mentioned, as a fraction of the displayed error at the given td [-].
+# Another td is mentioned if its displayed error is at most this fraction of the one at the given td [-].
 _MUCH_LESS: Final = 0.5
-# Smallest rigid time of another pair that is mentioned, as a fraction of the given pair's rigid time [-].
+# Another pair is mentioned if its rigid time is at least this fraction of the given pair's rigid time [-].
 _LEAST_KEPT: Final = 0.5
 # Number of td values in the grid of a page, so that its curve has a point every few pixels.
 _STEPS_OF_PAGE: Final = 120
@@ -261,7 +261,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # The full search is used, because it finds out why there is no oscillator.
+    # The full search is used, because it determines why there is no oscillator.
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
