@@ -59,7 +59,7 @@ _VERSIONS: Final = (
 
 
 class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output
-    """Carries BrokenPipeError past click, which would exit with code 1, the exit code of a failed check."""
+    """Exception that carries BrokenPipeError past click, which would exit with code 1, the code of a failed check."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -72,7 +72,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click passes the argument
-        """Return d2rpick's own help option, because files on the user's system could translate that of click."""
+        """Return d2rpick's own help option, because files on the user's system could change the language of click's."""
         return self._help
 
     @cached_property
@@ -103,7 +103,7 @@ class Documented(click.Command):
 
 
 class _CommandGroup(Documented, click.Group):
-    """Loads commands on demand, and turns errors into messages and exit codes."""
+    """Command group that loads commands on demand, and turns errors into messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click passes the argument
         return list(COMMANDS)
@@ -145,7 +145,7 @@ class _CommandGroup(Documented, click.Group):
         if not args and not ctx.resilient_parsing:
             click.echo(ctx.get_help(), err=True)
             ctx.exit(COULD_NOT_RUN)
-        # A copy is kept, because click empties the list of arguments.
+        # A copy is kept, because click empties the original list.
         ctx.meta["d2rpick.command"] = tuple(args)
         return super().parse_args(ctx, args)
 
@@ -156,7 +156,7 @@ class _CommandGroup(Documented, click.Group):
             raise _PipeClosed from error
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
-        except Exception as error:  # The user gets one line for any error.
+        except Exception as error:  # The user gets a one-line message for any error.
             if _is_interrupt(error):
                 raise click.Abort from None
             from d2rpick.cli.output import explain_error
@@ -165,7 +165,7 @@ class _CommandGroup(Documented, click.Group):
                 explain_error(error, ctx.meta.get("d2rpick.history", ()))
             ) from error
 
-    def main(  # type: ignore[override]  # options of click that are not needed are left out
+    def main(  # type: ignore[override]  # options of click that are not needed are omitted
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,
@@ -192,14 +192,14 @@ class _CommandGroup(Documented, click.Group):
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return True if an interrupt caused the error; an interrupt while a class is created becomes another error."""
+    """Return True if an interrupt caused the error; Python replaces an interrupt while it creates a class."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def stop_with_error(message: str) -> NoReturn:
-    """Print an error and end with exit code 2."""
+    """Print an error message and exit with code 2."""
     _tell_error(message)
     sys.exit(COULD_NOT_RUN)
 
@@ -228,7 +228,7 @@ def _print_versions(ctx: click.Context, _: click.Parameter, value: bool) -> None
 
 
 def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
-    """Make a command from a function; its docstring is the help text, with examples at the end."""
+    """Make a command from a function whose docstring is the help text, with examples at the end."""
 
     def made(function: Any) -> _Made:
         help_text, _, examples = cleandoc(function.__doc__).partition(
