@@ -85,7 +85,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def verified(self) -> bool:
-        """True if the pair is admissible, its grade is not "poor", and its residual is at most 0.5."""
+        """True if the pair is admissible, its grade is not "poor", and its residual is 0.5 or less."""
         residual = self.candidate.residual
         is_kept = residual is None or residual <= POOR_RESIDUAL
         return is_kept and self.decision.grade != POOR
@@ -141,7 +141,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def quality(self) -> Quality:
-        """Grades of the motion and of the vibration of the pair."""
+        """Grades for the motion and for the vibration of the pair."""
         return self.decision.quality
 
     @cached_property
@@ -316,7 +316,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
-        """Verdict on the better pair by the rules of ``verify``; None if there is no better pair."""
+        """Verdict on the better pair by the rules of ``verify``; None if no better pair is known."""
         better = self.better_pair
         if better is None:
             return None

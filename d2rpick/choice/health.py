@@ -193,7 +193,7 @@ def _is_unbalanced(health: Health) -> bool:
     )
 
 
-# For each warning about the health of a run: its code, the condition for issuing it, and its text.
+# Code, condition and text of each warning about the health of a run.
 # The internal energy of an LS-DYNA model includes the energy of eroded elements (ftp.lstc.com, FAQ energy_balance).
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
@@ -265,7 +265,7 @@ def _find_worst_part(balance: Balance) -> dict[str, Any]:
 
 
 def _find_ratio_range(balance: Balance) -> dict[str, Any]:
-    """Return the range of the energy ratio, as fields of `Health`, while the reference energy is large enough.
+    """Return the range of the energy ratio over the times with a large enough reference energy, as fields of `Health`.
 
     The ratio is that of the solver, or else computed from the terms.
     """
@@ -418,7 +418,7 @@ def _describe_divergence(history: History) -> str | None:
 
 
 def _has_no_energy(history: History) -> bool:
-    """Return True if the internal energies of the chosen parts and of the model are always 0, or all are negligible."""
+    """Return True if the internal energies of the chosen parts and of the model are all zero or negligible."""
     balance = history.balance
     if balance is None:
         return False

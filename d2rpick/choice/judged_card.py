@@ -51,7 +51,7 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Add the times at which the named contact or rigid wall exerts a force, and the closing speed of the parts.
+    """Add the times at which the named contact or rigid wall exerts a force, and the parts' closing speed.
 
     The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
     """
@@ -181,5 +181,5 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
 
 
 def _format_as_sentence(text: str) -> str:
-    """Return a reason with a capital letter and a full stop."""
+    """Return a reason as a sentence, with a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}."

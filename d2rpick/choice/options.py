@@ -88,7 +88,7 @@ def _describe_use(**use: Any) -> dict[str, Use]:
     return {"use": Use(**use)}
 
 
-# The class is not frozen, although its objects are never changed, because frozen classes slow start-up by 2 %.
+# The class is not frozen although its objects never change, because frozen classes slow start-up by 2 %.
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
@@ -166,7 +166,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # Rigid elements do not limit the time step, so it cannot become smaller than that of the deformable run.
+    # Rigid elements do not limit the time step, so it cannot be smaller than that of the deformable run.
     step_ratio: float | None = make_option(
         "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,

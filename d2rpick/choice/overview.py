@@ -342,7 +342,7 @@ def _find_maximum(energies: Samples) -> float | None:
 
 
 def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
-    """Yield a warning if parts are rigid in some time windows of the run."""
+    """Yield a warning if parts are rigid in some time intervals of the run."""
     if rigid:
         when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
         effect = "part data and internal energy mean nothing there and are not used for the health"
@@ -355,7 +355,7 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside its rigid windows; None if there are no energies."""
+    """Return the health of the run outside its rigid windows; None if the run has no energies."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )

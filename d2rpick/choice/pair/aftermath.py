@@ -88,7 +88,7 @@ def _compute_mean_ratio(
 
 
 def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Return bounds of the vibration energy at td, each as (elastic energy, total vibration energy) [energy]."""
+    """Return lower and upper bounds of the vibration energy at td, each as (elastic energy, total energy) [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
@@ -141,7 +141,7 @@ class Worth(NamedTuple):
 def compare_error_with_contact(
     situation: Situation, candidate: Candidate
 ) -> Worth | None:
-    """Compare the vibration error of a pair with the energy of the next contact; None if unknown.
+    """Compare the vibration error of a pair with the energy of the next contact; None if either is unknown.
 
     The energy of the error is R^2 U(td).  If the residual R is unknown, its largest value is used: that of equal levels
     with opposite signs.

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # Largest number of candidates that are judged in one batch; larger arrays need more memory and are not faster.
 _MOST: Final = 20_000
-# Largest growth factor of the number of td judged together, from one batch to the next [-].
+# Largest growth factor of the number of td that are judged together, from one batch to the next [-].
 _MORE: Final = 8
 # A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
 MUCH_HIGHER = 0.1
@@ -216,7 +216,7 @@ class Judged:
 
     @property
     def error(self) -> Samples:
-        """Error by which the candidates are ranked, see `Candidate.error`, shape (n,) [-]."""
+        """Error by which the candidates are ranked (see `Candidate.error`), shape (n,) [-]."""
         residual = self.columns["residual"]
         # Candidates with a wide error band rank lower, because the smallest of many estimates is too optimistic.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
@@ -482,7 +482,7 @@ def _list_remarks(
     reach: float,
     measured: Mapping[str, Any],
 ) -> Iterator[str]:
-    """Yield the notes on a tr that do not affect whether the tr is acceptable."""
+    """Yield the notes on a tr that do not make the tr unacceptable."""
     if not (measured or situation.vibration.unknown or situation.at_rest):
         yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
 
 _TURNS_PER_PERIOD: Final = 2
-# Files for which LS-DYNA usually has a shorter output interval than for d3plot.
+# LS-DYNA usually writes these files at shorter intervals than d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 

@@ -127,7 +127,7 @@ def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
 def is_within_band(
     error: Samples, expected: Samples, error_of_best: Samples, best: Samples
 ) -> NDArray[np.bool_]:
-    """Return True for each pair whose error cannot be distinguished from that of the best pair, given its error band.
+    """Return True for each pair that may be as good as the best pair, given the error band of the best pair.
 
     All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
@@ -225,7 +225,7 @@ class Excess(NamedTuple):
 def list_exceeded_limits(
     situation: Situation, candidate: Candidate
 ) -> tuple[Excess, ...]:
-    """Return the limits in the settings that a candidate exceeds, or for which its value is unknown."""
+    """Return the limits that the settings define and that a candidate exceeds or has no value for."""
     exceeded = []
     for limit, value in situation.settings.limits:
         of_td = limit.quantity not in candidate._fields
@@ -381,7 +381,7 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
 
 
 def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes for which the vibration is graded "poor"."""
+    """Return the causes of the vibration grade "poor"."""
     causes = []
     if best.residual is None:
         causes.append(_describe_unknown_direction(situation))
@@ -517,7 +517,7 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes for which the vibration is graded "fair"."""
+    """Return the causes of the vibration grade "fair"."""
     if best.residual is None:
         return []
     high = best.residual_high or best.residual

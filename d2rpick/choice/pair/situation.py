@@ -175,7 +175,7 @@ class Situation:
 
     @property
     def earliest_tr(self) -> float | None:
-        """Earliest acceptable tr: start of the flight plus the margin [time]; None if the start is unknown."""
+        """Earliest acceptable tr: the start of the flight plus the margin [time]; None if the start is unknown."""
         start = self.flight.start
         if start is None:
             return None

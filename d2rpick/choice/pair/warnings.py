@@ -389,7 +389,7 @@ class Means(NamedTuple):
 
     @property
     def largest_locked_in(self) -> float:
-        """Largest locked-in energy at which the energy after td does not exceed that of the reference run [energy]."""
+        """Largest locked-in energy for which the energy after td is no higher than in the reference run [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
@@ -654,7 +654,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """State the factor by which the mean energy after td would exceed that of the reference run."""
+    """State the ratio of the mean energy expected after td to that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"

@@ -385,7 +385,7 @@ def _make_zone_observations(
 def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Return the average numbers of deformable elements and integration points by class, and of rigid-body nodes."""
+    """Return the average numbers of deformable elements, integration points (both by class) and rigid-body nodes."""
     always = {
         part
         for part, data in inventory.parts.items()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost of an element per cycle [us]; a shell costs "point" more for each integration point after the first.
+# Cost of an element per cycle [us]; a shell costs "point" more for every integration point after the first.
 # The element costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
 # The costs of beams and springs are less accurate than the costs of other elements.
 POINT: Final = "point"
@@ -178,7 +178,7 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Formulations in the deck that have no weight, for which the weight of a similar formulation is assumed."""
+        """Formulations in the deck that have no weight and are assumed to cost as much as a similar formulation."""
         names: dict[str, None] = {}
         for part, counts in self.inventory.counts.items():
             if part in self._rigid:

@@ -95,7 +95,7 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
 
 
 def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
-    """Return True if the history contains an energy of any of the parts that is not always zero."""
+    """Return True if any of the parts has an energy in the history that is not always zero."""
     return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 

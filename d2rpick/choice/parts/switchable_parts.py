@@ -35,7 +35,7 @@ STOPPED: Final = 0.1
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# LANDING_ALONE: smallest fraction of the energy at the start of the landing that a bumper or skid absorbs [-].
+# LANDING_ALONE: a bumper or skid absorbs at least this fraction of the energy at the start of the landing [-].
 # _CHEAP: largest fraction of the total element cost that a bumper or skid may have and still stay deformable [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
@@ -267,7 +267,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; ``by_deck`` contains its mass and its time step according to the deck."""
+    """Collect the data of a part; ``by_deck`` contains the mass and the time step that its deck defines."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -314,7 +314,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the kind of a part: "spring" or "particles" according to its elements, or else its material's kind."""
+    """Return the type of a part: "spring" or "particles" according to its elements, or else its type of material."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:

@@ -188,7 +188,7 @@ class StudyOfRuns:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: the worst grade of any run's pair or of its error at this tr; None if unknown."""
+        """Grade of the common tr, the worst grade of any run's pair or of its error at this tr; None if unknown."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]

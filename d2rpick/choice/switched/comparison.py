@@ -42,7 +42,7 @@ _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of the difference between a switched run and its reference run; unknown quantities are None.
+    """Differences between a switched run and its reference run; unknown quantities are None.
 
     The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
 
@@ -323,7 +323,7 @@ def _check_rigid_window(
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
+    """Yield objections if the energy at td differs from that of the reference run, either near tr or at td."""
     if max(frozen, energy_td) <= round_off(reference):
         return  # An error relative to the vibration energy has no meaning if nothing vibrates.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 # Sources that determine the start of a flight to within a few states, unlike the energy alone.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Largest momentum of parts that are treated as not moving, as a fraction of the momentum of the model [-].
+# Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
 _HARDLY: Final = 0.1
 # Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
@@ -295,7 +295,7 @@ def _warn_about_deforming(
 
 
 class _AbsentWindow(NamedTuple):
-    """A window in which the ``rigid`` parts have no energies [time]; ``whole`` is True if no other part deforms."""
+    """A window [time] in which the ``rigid`` parts have no energies; ``whole`` is True if no other part deforms."""
 
     start: float
     end: float

@@ -1,4 +1,4 @@
-"""Find the flights of a record, in which td may lie."""
+"""Find the flights of a record, each of which may contain td."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def find_longest_flight(
 
 
 def compute_last_td(end: float, margin: float) -> float:
-    """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
+    """Return the last td whose distance from the end of a flight is at least ``margin``, even if printed [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
@@ -218,7 +218,7 @@ def _find_flights_without_landing(
 
 
 def list_momentum_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the momentum that shows the flight, and of the mass, keyed by name.
+    """Return the momentum columns that show the flight, and the mass column, keyed by name.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
     are columns of the velocity.  The result is empty if neither is written at the times of the energy.

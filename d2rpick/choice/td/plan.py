@@ -285,7 +285,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Complete a row of the plan with the window suggested for its flight, which starts after the previous landing.
+    """Complete a row of the plan with the window that is suggested if the flight starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.

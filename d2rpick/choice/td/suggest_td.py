@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 # The search for the best td tries this many of the most promising energy peaks, and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# Smallest lengths of the windows compared for many modes, relative to the longest window [-].
+# The windows compared for many modes have at least these lengths, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 # Good windows of at least this length, relative to the longest good window, are treated as equally long [-].
 _LONG: Final = 0.9
@@ -317,7 +317,7 @@ def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Cho
 def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Return the situation with the most certain flight in ``window``, and the td range that keeps the margin [time].
+    """Return the situation with the most certain flight in ``window``, and the td range before the margin [time].
 
     Raises
     ------
@@ -330,7 +330,7 @@ def find_best_known(
 
 
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in the range that keeps the margin even after rounding to printed digits.
+    """Return the last td in the range that respects the margin even after rounding to printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
     """
@@ -572,7 +572,7 @@ def _list_by_rigid_time(
 
 
 def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """Return the situations whose recommended pair saves time, each with its pair."""
+    """Return the situations whose recommended pair saves time, together with this pair."""
     return [
         (candidates.situation, candidates.saving)
         for candidates in rank_candidates([*situations], in_flight=True)
