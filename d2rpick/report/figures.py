@@ -319,7 +319,7 @@ def _place(
 
 
 def render_svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Return a figure as an SVG element for a page; its ids begin with ``prefix``, and its text stays text.
+    """Return a figure as an SVG element for a page; its ids begin with ``prefix``. Text is not drawn as outlines.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """

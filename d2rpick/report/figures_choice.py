@@ -59,13 +59,13 @@ if TYPE_CHECKING:
 # Heights of a figure [inch], with the energy only and with the motion too. On a page, they apply to each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Largest number of candidates that are drawn as marks; more candidates are drawn as a band of admissible tr.
+# Largest number of candidates that are drawn as marks; otherwise, a band shows the admissible tr.
 _FEW: Final = 20
 # Height of the band at the bottom of the axes, below the curve, as a fraction of the axes [-].
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# Smallest length of a window that has its times in its label, as a fraction of the simulated time [-].
+# A window of at least this length has its times in its label, as a fraction of the simulated time [-].
 _ROOM_FOR_TIMES: Final = 0.2
 
 # Colours of the windows in a plan, keyed by verdict or state.
@@ -608,7 +608,7 @@ def _select_energies(
 
 
 def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
-    """Write the run names next to the axes, in the order of the curves, each joined to its curve by a line."""
+    """Write the run names next to the axes, in the order of the curves; a line connects each name to its curve."""
     end = axes.get_xlim()[1]
     free = 0.0
     runs_by_height = (

@@ -396,7 +396,7 @@ def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
 
 
 def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
-    """Return the verdict on a pair, its reason and its cure, keyed by JSON key; None if the pair was not judged."""
+    """Return the verdict on a pair with its reason and cure, keyed like the JSON output; None if it was not judged."""
     return {
         "verdict": decision and decision.verdict,
         "verdict_reason": decision and decision.reason,

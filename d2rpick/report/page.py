@@ -244,7 +244,7 @@ def build_scrolling_table(
 def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Return a table without a scrolling box, in which the row ``marked`` is highlighted.
+    """Return a table without a scrolling box; the row ``marked`` is highlighted.
 
     Columns of numbers are right-aligned.  Lines break only at blanks, never within a number.
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Column names of the table of sets, and of the two tables that share the columns for parts.
+# Column names of the table of sets, and of the two tables of parts.
 SETS = (
     "set",
     "parts",

@@ -224,7 +224,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without its name, or else the codes of its warnings; empty if it has neither."""
+    """Return the message of a run without the run's name, or else the codes of its warnings; empty without either."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 

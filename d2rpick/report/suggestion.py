@@ -162,7 +162,7 @@ def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
 
 
 def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
+    """Return, each with a name, what to do with the recommended pair, why, and what to expect after td."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better

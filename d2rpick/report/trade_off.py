@@ -43,7 +43,7 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# Columns of the CSV output and of a data frame.
+# Columns of the CSV output and of data frames.
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]

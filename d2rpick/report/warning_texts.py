@@ -410,6 +410,6 @@ EXPLANATIONS: Final = {
 
 
 def explain_warning(code: str) -> str:
-    """Return the explanation of the warning with a code, which is one of `EXPLANATIONS`."""
+    """Return the explanation of the warning with the given code, which is a key of `EXPLANATIONS`."""
     means, fix = EXPLANATIONS[code]
     return f"{code} (warning): {means}\n\nFix: {fix}"
