@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class RunQuestion(NamedTuple):
-    """A question: the opened run, the selected energy, and the settings by which the run is judged.
+    """A question: the opened run, the selected energy, and the settings that determine how the run is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
     deck.  ``on_card`` are parts that only the card contains.

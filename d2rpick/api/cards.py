@@ -64,7 +64,7 @@ class CardOptions(TypedDict, total=False):
 if TYPE_CHECKING:
 
     class Judging(CardOptions, JudgingOptions, total=False):
-        """Options of a card, and the options by which its windows are judged."""
+        """Options of a card, together with the options that determine how its windows are judged."""
 
 
 def _check_option(name: str, value: Any, option: Option) -> Any:
@@ -476,7 +476,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the options of a card for which there is no history; raise ArgumentError if an option is missing."""
+    """Return the options of a card that has no history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that already switches parts when it is first computed."""
+"""Drive a Radioss run that switches parts without a reference run."""
 
 from __future__ import annotations
 

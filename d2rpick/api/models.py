@@ -156,7 +156,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Box:
-    """Request for the rollover box in SI units: the box, its windows and the scan."""
+    """Request for the rollover box in SI units: its parameters, its windows and the scan."""
 
     tr: tuple[float, ...] = make_option(
         "Switch the box to rigid at this time; for several windows give --tr and --td in pairs.",

@@ -199,7 +199,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card for the next run, and judge its new windows; None if there is no new window."""
+        """Print the card for the next run, and judge its new windows; None if there are no new windows."""
         new = self.all_windows if every else self.windows
         question = self.question
         question = question._replace(

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
-# Beginning of the line with the summary, which follows the rows.
+# First bytes of the summary line, which follows the rows.
 _LAST: Final = b'{"schema": '
 
 

@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run if one is given, from which missing times are determined."""
+    """Judge a pair; a finished switched run, if given, is compared too and provides the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

@@ -75,7 +75,7 @@ class TimeArguments:
     def convert_options(
         self, values: Mapping[str, Any], options: Mapping[str, Option]
     ) -> dict[str, Any]:
-        """Return the values of options, keyed by name; values that are times are converted."""
+        """Return the values of options, keyed by name, after converting the times among them."""
         return {
             name: self.convert(name, value)
             if name in options and options[name].is_time
@@ -84,7 +84,7 @@ class TimeArguments:
         }
 
     def convert(self, name: str, value: object) -> object:
-        """Return a value in which each time with a unit is replaced by a number, also in lists and tuples.
+        """Return a value in which each time with a unit is replaced by a number, even within lists and tuples.
 
         Raises
         ------
