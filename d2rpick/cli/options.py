@@ -376,7 +376,7 @@ def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -
     ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
-# Options that every command accepts but no command uses itself; they are kept in the context of click.
+# Options that every command accepts but does not use itself; they are kept in the context of click.
 _FLAGS: Final = [
     _share_option(
         click.option(

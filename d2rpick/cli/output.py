@@ -49,7 +49,7 @@ _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Options whose names differ from those of the arguments that messages name in backticks.
+# Options with names that differ from the argument names that messages show in backticks.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),

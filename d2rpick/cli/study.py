@@ -215,7 +215,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """Return the number of runs whose rows are taken from an earlier study, and print it."""
+    """Print and return the number of runs whose rows are taken from an earlier study."""
     if ledger is None:
         return 0
     known_count = ledger.taking(sources)

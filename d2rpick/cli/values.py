@@ -155,7 +155,7 @@ class Names(CompletedText):
 
 
 class PartNames(Names):
-    """Ids and titles of parts, completed from the history that is named on the command line."""
+    """Ids and titles of parts, completed from the history on the command line."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
         """Return the parts in the files on the command line, and the words that stand for several parts."""
