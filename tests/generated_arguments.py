@@ -94,7 +94,8 @@ def write_module() -> str:
     )
     choosing = write_class(
         "Choosing(JudgingOptions, total=False)",
-        "Options that determine how pairs are chosen and judged, as in ``d2rpick suggest``.  None stands for the default.",
+        "Options that determine how pairs are chosen and judged, as in ``d2rpick suggest``.  "
+        "None stands for the default.",
         list_arguments(others) | OF_PYTHON,
     )
     return "\n".join([HEAD.rstrip("\n"), *judging, *choosing, ""])

@@ -62,7 +62,7 @@ class PartOverview(NamedTuple):
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall, and the intervals (start, end) in which it ``acts`` on parts [time]."""
+    """A contact or rigid wall, and the intervals ``acts`` (start, end) in which it acts on parts [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]

@@ -289,7 +289,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Describe the windows of acceptable tr: the one with the recommended tr, the longest others, and their sum."""
+    """Describe the windows of acceptable tr: the one with the recommended tr, the longest others, and the total."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"

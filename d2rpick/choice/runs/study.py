@@ -381,7 +381,7 @@ def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
 
 
 def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
-    """Return a digest of each file of a run, or of the file name if the file can no longer be read."""
+    """Return a digest of each file of a run, or of the file's name if the file can no longer be read."""
     digests = []
     for stamp in row.files:
         try:
@@ -514,7 +514,7 @@ def _find_least_loss(
 
 
 def find_fewest_digits(low: float, high: float) -> float:
-    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to their middle.
+    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to the mean.
 
     Examples
     --------

@@ -152,7 +152,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of all windows of the next run, used before or supported [time]; empty if no window is new.
+        """Pairs (tr, td) of all windows of the next run, both used and supported [time]; empty if no window is new.
 
         The next run starts again from the beginning, so it needs both kinds.
         """

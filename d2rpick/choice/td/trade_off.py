@@ -330,7 +330,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error, or else the recommended proposal if it is better, or else None.
+    """Return the nearest proposal with half the error; if there is none, the recommended proposal if it is better.
 
     Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """
