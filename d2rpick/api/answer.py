@@ -82,9 +82,10 @@ class Answer:
 
     def to_json(self) -> str:
         """Return the JSON document that the command line prints; it contains the name of its schema."""
+        from d2rpick.api.option_names import replace_arguments
         from d2rpick.report.formats import DisplayOptions
 
-        return self.text("json", DisplayOptions(self.command))
+        return replace_arguments(self.text("json", DisplayOptions(self.command)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON document that the command line prints, as a dictionary."""

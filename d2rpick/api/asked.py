@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import CostModel, Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories import run as histories
+    from d2rpick.report.formats import RepeatedQuestion
 
 
 class RunQuestion(NamedTuple):
@@ -63,6 +64,17 @@ class RunQuestion(NamedTuple):
         if self.of_this_run or self.request.deck_in_folder:
             return None
         return self.request.deck
+
+    @property
+    def repeated(self) -> RepeatedQuestion:
+        """Words of the command line with which other commands ask about the same run."""
+        if self.unused_deck:
+            question = self.request.repeat(without=("deck", "weights", "step_ratio"))
+            return question._replace(
+                options=("--no-deck", *question.options),
+                judging=(*question.judging, "--no-deck"),
+            )
+        return self.request.repeat()
 
     @property
     def options(self) -> tuple[str, ...]:

@@ -226,6 +226,7 @@ class Plan(RunAnswer, planning.RunPlan):
             command,
             card.card.text if card else None,
             explorer,
+            self.question.repeated,
         )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
+    from d2rpick.report.formats import RepeatedQuestion
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
@@ -268,6 +269,20 @@ class Request(ChoiceOptions, ReadingOptions):
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
+    def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
+        """Return the words of the command line with which other commands ask about the same run."""
+        from d2rpick.report.formats import RepeatedQuestion
+
+        left_out = {"part", *without}
+        names = [name for name in self._given() if name not in left_out]
+        of_deck = {"deck", "no_deck"} - left_out
+        return RepeatedQuestion(
+            parts=self.asking(("part",)),
+            options=self.asking(names),
+            judging=(*self.judging(), *self.asking(of_deck)),
+            files=self.history,
+        )
+
     def without_history(self) -> None:
         """Refuse options for judging windows if there is no history."""
         if lost := [
@@ -313,11 +328,15 @@ def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
     split = (text.partition("=") for text in texts)
     pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
     for quantity, name in pairs:
-        if quantity not in QUANTITIES or not name:
+        if quantity not in QUANTITIES and name:
             near = suggest_name(quantity, tuple(QUANTITIES))
-            quantities = near or f", with one of {', '.join(QUANTITIES)}"
             raise ArgumentError(
-                f"`channels` {quantity}={name}: QUANTITY=NAME was expected{quantities}"
+                f"`channels` {quantity}={name}: unknown quantity {quantity!r}{near}, one of {', '.join(QUANTITIES)} "
+                "was expected"
+            )
+        if not name:
+            raise ArgumentError(
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
             )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
-from d2rpick.api.tables import is_table
 from d2rpick.base.errors import give_if_written
 
 if TYPE_CHECKING:
@@ -213,6 +212,9 @@ def read(
     >>> read("sample_data/energy.csv").channels
     ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.api.tables import is_table
+
     if is_table(source):
         raise TypeError(
             f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)"

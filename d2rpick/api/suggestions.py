@@ -348,7 +348,9 @@ def judge_pair(
     result = answers.verify_run(question.reference, tr, td, question.settings)
     times = ["--tr", repr(tr), "--td", repr(td)]
     if switched is not None and switched_reference:
-        result = answers.compare_with(
+        from d2rpick.choice.switched.compared_verdict import add_comparison
+
+        result = add_comparison(
             result, question.reference, switched_reference, min_mean_energy
         )
         times += [text for name in switched.sources for text in ("--switched", name)]

@@ -8,6 +8,7 @@ The search ends at the root of a repository or at the user's home, and uses only
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
@@ -178,6 +179,22 @@ def _may_have_settings(text: str) -> bool:
     return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
 
 
+def _explain_toml_error(path: str, error: Exception) -> str:
+    """Return the message for a file that cannot be read as TOML, with the line and the cure if they are known."""
+    place = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
+    if place is None:
+        return f"{path}: {error}; valid TOML was expected"
+    with open(path, encoding="utf-8-sig") as file:
+        line = file.read().split("\n")[int(place[1]) - 1].strip()
+    cure = ""
+    if re.search(r"=\s*\d+,\d+\s*(#|$)", line):
+        cure = "; write the number with a decimal point"
+    reason = f"{format_toml_value(line)} was found, valid TOML was expected"
+    return (
+        f"{path}:{place[1]}:{place[2]}: {reason} ({str(error)[: place.start()]}){cure}"
+    )
+
+
 def _read_table(path: str, *, shared: bool) -> object:
     """Read the settings in a TOML file; None if a file that is ``shared`` with other tools has no settings."""
     try:
@@ -192,7 +209,7 @@ def _read_table(path: str, *, shared: bool) -> object:
         # Python refuses to print numbers with thousands of digits, which a message may contain
         repr(table)
     except (ValueError, OSError, RecursionError) as error:
-        raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
+        raise ConfigurationError(_explain_toml_error(path, error)) from None
     if not shared:
         return table
     tools = table.get("tool")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
+from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.health import (
     OF_THE_MODEL,
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.health import Health
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.switched.comparison import Comparison
+    from d2rpick.choice.td.suggest_td import Chosen
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
@@ -94,7 +96,11 @@ class PairVerdict(AnswerAtTd):
     def decision(self) -> Decision:
         """Verdict on the pair, with its reason and cure."""
         decision = self._decide(None)
-        return self._decide(self.better) if decision.grade == POOR else decision
+        if decision.grade == POOR:
+            decision = self._decide(self.better)
+        if self._is_refuted:
+            return decision
+        return compare_in_flight(decision, self.situation, self.candidate)
 
     def _decide(self, better: Pair | None) -> Decision:
         """Return the verdict on the pair; ``better`` is a better pair, or None if no better pair is known."""
@@ -111,7 +117,8 @@ class PairVerdict(AnswerAtTd):
         )
         if self.switched is None:
             return decision
-        return decision._replace(quality=omit_comparison(decision.quality))
+        quality = omit_comparison(decision.quality)
+        return decision._replace(quality=quality, is_compared=True)
 
     @cached_property
     def better(self) -> Pair | None:
@@ -348,14 +355,10 @@ class PairSuggestion(AnswerAtTd):
         """
         better = self.better_pair
         recommended = self.recommended
-        if better is None or recommended is None:
+        if better is None or recommended is None or self.chosen is None:
             return better
         if better.residual is not None and recommended.residual is not None:
-            bound = self.chosen.residual_high if self.chosen else None
-            uncertain = 0.0 if bound is None else bound - recommended.residual
-            if recommended.residual - better.residual > max(EQUALLY_GOOD, uncertain):
-                return better
-            return None
+            return better if _has_smaller_residual(better, self.chosen) else None
         levels = [
             max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5
             for td in (better.td, recommended.td)
@@ -363,12 +366,88 @@ class PairSuggestion(AnswerAtTd):
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
+def _has_smaller_residual(pair: Pair, candidate: Candidate) -> bool:
+    """Return True if the residual of a pair is smaller than that of a candidate, beyond its uncertainty."""
+    if pair.residual is None or candidate.residual is None:
+        return False
+    bound = candidate.residual_high
+    uncertain = 0.0 if bound is None else bound - candidate.residual
+    return candidate.residual - pair.residual > max(EQUALLY_GOOD, uncertain)
+
+
 def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
     """Return the verdict on the recommended pair; if that pair is not good, search for a better pair first."""
     decision = answer.decision
-    if decision is None or decision.reaches(GOOD) or answer.better_pair:
+    best = answer.chosen
+    if best is None or decision is None or decision.reaches(GOOD):
         return decision
-    return suggest_at(answer.situation, ranked=answer.candidates).decision
+    if not answer.better_pair:
+        decision = suggest_at(answer.situation, ranked=answer.candidates).decision
+    return decision and compare_in_flight(decision, answer.situation, best)
+
+
+def compare_in_flight(
+    decision: Decision, situation: Situation, candidate: Candidate
+) -> Decision:
+    """Add to the decision on a pair a clearly better pair of the same flight, or else the range of td without one.
+
+    The flight is searched only if another time may be better, and no better pair is known yet.
+    """
+    needs_other_times = decision.objections or any(
+        cause.needs_other_times for cause in decision.quality.causes
+    )
+    if decision.grade == GOOD or decision.better or not needs_other_times:
+        return decision
+    choice = _choose_in_flight(situation)
+    if choice is None or choice.recommended is None or choice.decision is None:
+        return decision
+    if decision.grade == POOR:
+        is_better = choice.decision.grade != POOR
+    else:
+        is_better = _has_smaller_residual(choice.recommended, candidate)
+    if is_better:
+        return decision._replace(better=choice.recommended)
+    return decision._replace(best_of=choice.compared_td)
+
+
+def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
+    """Return the pair that is chosen in the flight of a situation; None if its flight is unknown."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.flights import find_longest_flight
+
+    history, settings = situation.history, situation.settings
+    flight = situation.flight
+    if flight.start is None:
+        return None
+    own = (flight.start, history.end if flight.end is None else flight.end)
+    longest = find_longest_flight(history, settings, otherwise=own)
+    is_longest = longest[0] <= situation.td <= longest[1]
+    return _choose_in_window(history, settings, longest if is_longest else own)
+
+
+@remember
+def _choose_in_window(
+    history: History, settings: Settings, window: tuple[float, float]
+) -> PairSuggestion | None:
+    """Return the pair that is chosen in a window for td; None if the record does not allow a choice."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.td.suggest_td import choose_td
+
+    try:
+        return _suggest_in_window(choose_td(history, window, settings))
+    except RangeError:
+        return None
+
+
+def _suggest_in_window(chosen: Chosen) -> PairSuggestion:
+    """Return the suggestion for the td that was chosen in a window."""
+    answer = suggest_at(chosen.situation)
+    return replace(
+        answer,
+        td_window=chosen.window,
+        compared_td=chosen.inside,
+        longer=chosen.given_up(answer.recommended),
+    )
 
 
 def suggest_in_history(
@@ -500,6 +579,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             f"the margin {situation.margin:.6g} after the load and before the contact leaves nothing of the flight, "
             f"{flight.start:.6g} to {flight.end:.6g}; give a smaller `margin`"
         )
+    if not (situation.history.parts or situation.history.energy.any()):
+        return "the energy is 0 in all states, so nothing deforms; choose the internal energy with `energy`"
     if not ranked:
         level = situation.energy_td
         return (
@@ -507,7 +588,8 @@ def _explain_why_none(situation: Situation, ranked: Candidates) -> str:
             "peaks near it"
         )
     if situation.td > situation.latest_td:
-        return f"td = {situation.td:.6g}: {'; '.join(list_objections_to_td(situation))}"
+        reasons = "; ".join(list_objections_to_td(situation)).removeprefix("td ")
+        return f"td = {situation.td:.6g} lies {reasons}"
     nearest = ranked[0]
     exceeded = list_exceeded_limits(situation, nearest)
     reasons = "; ".join((*nearest.notes, *(excess.message for excess in exceeded)))
@@ -544,17 +626,33 @@ def suggest_in_run(
         )
 
         chosen = choose_td(reference.history, td, settings, since, times)
-        answer = suggest_at(chosen.situation)
-        answer = replace(
-            answer,
-            td_window=chosen.window,
-            compared_td=chosen.inside,
-            longer=chosen.given_up(answer.recommended),
-        )
+        answer = _suggest_in_window(chosen)
     else:
         situation = examine_td(reference.history, td, settings)
         answer = suggest_at(situation, with_better=with_better)
+        if with_better:
+            answer = _add_choice_in_flight(answer)
+    _refuse_switched(answer.situation)
     return _add_health(answer, reference.run)
+
+
+def _refuse_switched(situation: Situation) -> None:
+    """Raise RangeError if the parts were rigid in the flight up to td."""
+    # Imported here to keep start-up fast.
+    from d2rpick.choice.switched.frozen import refuse_switched
+
+    refuse_switched(situation.history, situation.flight.start, situation.td)
+
+
+def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
+    """Add to the answer for a given td what the search of its flight finds if the pair is not good."""
+    best, decision = answer.chosen, answer.decision
+    if best is None or decision is None or decision.better:
+        return answer
+    decision = compare_in_flight(decision, answer.situation, best)
+    if decision.better:
+        return replace(answer, better_pair=decision.better)
+    return replace(answer, compared_td=decision.best_of)
 
 
 def verify_run(
@@ -567,39 +665,8 @@ def verify_run(
     """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
+    _refuse_switched(verdict.situation)
     return _add_health(verdict, reference.run)
-
-
-def compare_with(
-    verdict: PairVerdict,
-    reference: Reference,
-    switched: Reference,
-    min_mean: float = 0.0,
-) -> PairVerdict:
-    """Add the comparison of a finished switched run with the reference run to a verdict.
-
-    Both runs are read in the same way.  ``min_mean`` is the smallest expected mean energy after td, as a share of that
-    of the reference run [-].
-
-    Raises
-    ------
-    RangeError
-        If one of the two runs does not continue after td.
-    """
-    from d2rpick.choice.switched.comparison import compare_with_reference
-
-    comparison = compare_with_reference(
-        verdict.situation, verdict.candidate.tr, reference, switched, min_mean
-    )
-    return replace(
-        verdict,
-        switched=comparison,
-        computed=switched.history,
-        # The pair is inadmissible if the switched run deviates too much, whatever the reference run shows.
-        admissible=verdict.admissible and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
-        cautions=(*verdict.cautions, *warn_about_engine(switched.run.sources)),
-    )
 
 
 def _add_health(answer: _Answer, run: OpenedRun) -> _Answer:

@@ -26,8 +26,8 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.switched.frozen import Times, find_frozen_times
 from d2rpick.choice.switched.switched_run import (
-    Times,
     find_rigid_times,
     select_model_momenta,
 )
@@ -86,7 +86,8 @@ class Overview(NamedTuple):
     ``health`` is that of the run, with the longest flight as its window; None if there are no energies.  ``unjudged``
     states why no times can be chosen from the run; empty if they can.  ``should_write`` names the output that would
     show the flights for certain; None if it is written, or there is no state.  ``deck`` is the main deck of the run
-    that was used, and ``selection`` the columns and parts that the user chose.
+    that was used, and ``selection`` the columns and parts that the user chose.  ``rigid`` are the windows in which
+    parts are rigid.
     """
 
     source: tuple[str, ...]
@@ -110,11 +111,12 @@ class Overview(NamedTuple):
     contact_forces: tuple[ForceOverview, ...] = ()
     deck: str | None = None
     selection: Selection = Selection()
+    rigid: tuple[Times, ...] = ()
 
     @property
     def verdict(self) -> str:
         """Verdict on whether switch times can be chosen from this run: "use", "use with care" or "do not use"."""
-        if self.unjudged or not self.flights:
+        if self.unjudged or not self.flights or self._is_spent:
             return DO_NOT_USE
         return USE_WITH_CARE if self._doubts else USE
 
@@ -125,14 +127,33 @@ class Overview(NamedTuple):
             return "; ".join(caution.message for caution in self.unjudged)
         if not self.flights:
             return "no free flight is found, so nothing can be made rigid"
+        if self._is_spent:
+            return (
+                f"this is a switched run: parts are rigid from {_list_times(self.rigid)}, and no flight follows; "
+                "choose times from the reference run, and compare this one with it (d2rpick verify)"
+            )
         summary = f"{_describe_flights(self.flights)}; {_describe_health(self.health)}"
         return "; ".join(self._doubts) or summary
+
+    @property
+    def _is_spent(self) -> bool:
+        """True if parts were rigid, and no flight begins after that."""
+        last = max((end for _, end in self.rigid), default=None)
+        return last is not None and all(
+            flight.start < last for _, flight in self.flights
+        )
 
     @property
     def _doubts(self) -> list[str]:
         """Reasons to use a run with flights only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
+        if self.rigid:
+            when = _list_times(self.rigid)
+            doubts.insert(
+                0,
+                f"parts are rigid from {when}, so only later flights can be planned",
+            )
         if not self.complete:
             doubts.append(
                 "the files end within a state; read them again when the run has ended"
@@ -183,6 +204,7 @@ def describe_run(
     if history:
         flaws = tuple(list_flaws(history))
         rigid = find_rigid_times(Reference(run, history))
+        rigid = rigid or find_frozen_times(history)
         flights = _find_flights_to_choose_from(
             select_model_momenta(history) if rigid else history
         )
@@ -223,6 +245,7 @@ def describe_run(
         ),
         deck=deck,
         selection=selection,
+        rigid=rigid,
     )
 
 
@@ -344,9 +367,14 @@ def _find_maximum(energies: Samples) -> float | None:
 def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
     """Yield a warning if parts are rigid in some time intervals of the run."""
     if rigid:
-        when = list_names([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        when = _list_times(rigid)
         effect = "part data and internal energy mean nothing there and are not used for the health"
         yield Caution("rigid-legs", f"parts are rigid from {when}: {effect}")
+
+
+def _list_times(windows: Sequence[Times]) -> str:
+    """Return windows of time as text."""
+    return list_names([f"{start:.6g} to {end:.6g}" for start, end in windows])
 
 
 def _assess_health_of_run(

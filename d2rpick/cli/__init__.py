@@ -102,6 +102,10 @@ class Documented(click.Command):
         formatter.write("\n" + "\n".join(lines) + "\n")
 
 
+# An option is not suggested if its likeness to a mistyped one is smaller than that of the best by more than this [-].
+_LESS_ALIKE: Final = 0.1
+
+
 class _CommandGroup(Documented, click.Group):
     """Command group that loads commands on demand, and turns errors into messages and exit codes."""
 
@@ -176,7 +180,7 @@ class _CommandGroup(Documented, click.Group):
             code = super().main(args, prog_name or "d2rpick", **extra)
         except click.UsageError as error:
             where = f" (see '{error.ctx.command_path} --help')" if error.ctx else ""
-            stop_with_error(error.format_message().rstrip(".") + where)
+            stop_with_error(_format_usage_error(error).rstrip(".") + where)
         except click.ClickException as error:
             stop_with_error(error.format_message())
         except OSError as error:  # The help or the version could not be written.
@@ -189,6 +193,22 @@ class _CommandGroup(Documented, click.Group):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(BROKEN_PIPE)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _format_usage_error(error: click.UsageError) -> str:
+    """Return the message of a usage error; an unknown option is compared with the options that resemble it most."""
+    if not isinstance(error, click.NoSuchOption) or not error.possibilities:
+        return error.format_message()
+    import difflib
+
+    likeness = {
+        name: difflib.SequenceMatcher(None, error.option_name, name).ratio()
+        for name in error.possibilities
+    }
+    best = max(likeness.values())
+    nearest = [name for name in likeness if likeness[name] >= best - _LESS_ALIKE]
+    names = " or ".join(map(repr, sorted(nearest, key=lambda name: -likeness[name])))
+    return f"{error.message.rstrip('.')}. Did you mean {names}?"
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

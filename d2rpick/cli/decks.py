@@ -14,7 +14,7 @@ from d2rpick.cli.output import (
     Output,
     encode_text,
     explain_error,
-    replace_arguments_for_people,
+    name_options_and_wrap,
     tell,
 )
 from d2rpick.cli.values import CARDS, choose_click_type
@@ -165,7 +165,7 @@ def check(
     form = output.output_format
     if findings.results or form != "table":
         output.result(
-            replace_arguments_for_people(
+            name_options_and_wrap(
                 findings.text(form, output.shown()), form, output.columns
             )
         )
@@ -203,6 +203,4 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the usage 
     output = output.beside()
     display = output.shown()
     text = explain_rules(id, display.width, with_examples=display.verbose)
-    output.result(
-        text or replace_arguments_for_people(list_rules(), "table", output.columns)
-    )
+    output.result(text or name_options_and_wrap(list_rules(), "table", output.columns))

@@ -35,8 +35,8 @@ from d2rpick.cli.output import (
     Output,
     VerdictOnPair,
     check_switched,
+    name_options_and_wrap,
     open_with_output,
-    replace_arguments_for_people,
 )
 from d2rpick.cli.progress import show_computing, show_reading
 from d2rpick.cli.values import CARDS
@@ -71,7 +71,7 @@ def info(request: Request, output: Output) -> None:
     form = output.output_format
     display = output.shown()
     output.result(
-        replace_arguments_for_people(
+        name_options_and_wrap(
             write("overview", form, overview, display), form, display.width
         )
     )
@@ -179,7 +179,8 @@ def suggest(
         output.card(judged_card, new_cautions)
         decision = judged_card.worst if judged_card else None
     else:
-        output.answer(answer)
+        times = options.write_times(td=td, td_window=td_window)
+        output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
     # The best pair for a given td is shown even if it is poor; in this case, the answer and the card say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
@@ -259,7 +260,8 @@ def explore(
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
-    output.answer(answer)
+    times = options.write_times(td=td, td_window=td_window)
+    output.answer(answer, question=question.repeated._replace(times=times))
     chosen = answer.recommended
     decision = chosen.decision if chosen else None
     _finish_answer(output, question, decision, question.settings.min_quality)
@@ -323,7 +325,8 @@ def verify(
     output.beside_answer(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
-    output.answer(answer)
+    times = options.write_times(tr=tr, td=td, switched=switched)
+    output.answer(answer, question=question.repeated._replace(times=times))
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 
@@ -376,7 +379,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
         answer = compare_parts(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat_command()))
-    output.answer(answer)
+    output.answer(answer, question=request.repeat())
     output.finish(objection=answer.recommended is None)
 
 
@@ -490,6 +493,9 @@ def plan(
             answer,
             checked if form == "table" else "",
             every=every,
+            question=question.repeated._replace(
+                times=options.write_times(min_rigid=min_rigid, done=done, before=before)
+            ),
             written_deck=WrittenDeck(write_deck, passed)
             if write_deck and checked
             else None,

@@ -11,12 +11,20 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
-from d2rpick.api.request import ADVANCED, CHOOSING, JUDGING, READING, Request
+from d2rpick.api.option_names import replace_arguments
+from d2rpick.api.request import (
+    ADVANCED,
+    CHOOSING,
+    JUDGING,
+    READING,
+    Request,
+    write_option,
+)
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.options import TIME, Option, list_options, make_option_name
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, make_documented
-from d2rpick.cli.output import Output, encode_text, replace_arguments, tell
+from d2rpick.cli.output import Output, encode_text, tell
 from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import (
     CARDS,
@@ -67,6 +75,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 }
 # Options that write files; if the command is repeated, these files already exist.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
+_PAIRS: Final = ("td_window",)
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
 # Key in the context of click for a flag that is True if only the settings are shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
@@ -419,6 +428,24 @@ def repeat_command() -> list[str]:
     ):
         words = insert_options(words, ["--overwrite"])
     return [*(["env", *variables] if variables else []), "d2rpick", *words]
+
+
+def write_times(**values: Any) -> tuple[str, ...]:
+    """Return options as typed; those without a value are left out.
+
+    Examples
+    --------
+    >>> write_times(td=0.5, td_window=None, switched=("a", "b"))
+    ('--td', '0.5', '--switched', 'a', '--switched', 'b')
+    """
+    return tuple(
+        word
+        for name, value in values.items()
+        if value is not None
+        for word in write_option(
+            name, value, many=isinstance(value, tuple) and name not in _PAIRS
+        )
+    )
 
 
 def insert_options(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TextIO
 
 import click
 
-from d2rpick.api.cards import Cards, JudgedCard
-from d2rpick.api.request import OPTIONS, Request
+from d2rpick.api.option_names import replace_arguments
 from d2rpick.base.errors import (
     FORESEEN,
     ArgumentError,
@@ -22,13 +21,15 @@ from d2rpick.base.errors import (
     make_printable,
 )
 from d2rpick.base.files import write_as_a_whole
-from d2rpick.base.options import UNLIMITED, list_options, make_option, make_option_name
+from d2rpick.base.options import UNLIMITED, make_option, make_option_name
 from d2rpick.cli.progress import is_on_terminal, show_reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
+    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
     from d2rpick.report.formats import DisplayOptions
@@ -49,30 +50,6 @@ _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Options with names that differ from the argument names that messages show in backticks.
-ARGUMENTS: Final = (
-    *OPTIONS,
-    *list_options(Cards),
-    *(
-        "td",
-        "td_window",
-        "tr",
-        "min_rigid",
-        "overwrite",
-        "write_as",
-        "done",
-        "before",
-        "wait",
-        "min_mean_energy",
-    ),
-)
-_OTHERS: Final = {
-    "parts": "part",
-    "channels": "channel",
-    "replay": "no_verify",
-    "run": "history",
-}
-_FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 # Output formats that already explain why nothing is recommended.
 IN_WORDS: Final = {"table", "markdown"}
 
@@ -193,7 +170,7 @@ class Output:
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
         """Write an answer in the requested format."""
         now = self.shown(**display_options)
-        text = replace_arguments_for_people(
+        text = name_options_and_wrap(
             answer.text(self.output_format, now), self.output_format, now.width
         )
         self.result(f"{text}\n\n{below}" if below else text)
@@ -404,42 +381,14 @@ def encode_text(text: str) -> bytes:
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
-def replace_arguments(message: str) -> str:
-    """Replace the argument names in a message with the options that set these arguments.
+def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
+    """Replace argument names with options in a result, and wrap a table to ``width`` columns.
 
     Examples
     --------
-    >>> replace_arguments("give it as `after` where it is known")
-    'give it as --after where it is known'
-    """
-    has_names = "`" in message
-    if has_names:
-        return re.sub(
-            r"`(\w+)`", lambda match: find_option(match[1]) or match[0], message
-        )
-    return message
-
-
-def find_option(argument: str) -> str:
-    """Return the option that sets an argument; empty if there is no such option."""
-    name = _OTHERS.get(argument, argument)
-    return f"--{make_option_name(name)}" if name in ARGUMENTS else ""
-
-
-def replace_arguments_for_people(text: str, form: str, width: int = 0) -> str:
-    """Replace argument names with options in a result for people, and wrap it to ``width`` columns.
-
-    Results for programs keep the argument names.
-
-    Examples
-    --------
-    >>> replace_arguments_for_people("choose with `energy`", "table")
+    >>> name_options_and_wrap("choose with `energy`", "table")
     'choose with --energy'
-    >>> replace_arguments_for_people("choose with `energy`", "json")
-    'choose with `energy`'
     """
-    if form in _FOR_PROGRAMS:
-        return text
     text = replace_arguments(text)
     if form != "table" or not width:
         return text

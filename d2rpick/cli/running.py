@@ -10,7 +10,7 @@ import click
 from d2rpick.base.errors import make_printable
 from d2rpick.base.options import NOT_NEGATIVE, POSITIVE, Option
 from d2rpick.cli import options
-from d2rpick.cli.output import Output, encode_text, replace_arguments_for_people, tell
+from d2rpick.cli.output import Output, encode_text, name_options_and_wrap, tell
 from d2rpick.cli.progress import show_progress
 from d2rpick.cli.values import choose_click_type
 from d2rpick.report.formats import FORMATS
@@ -203,7 +203,7 @@ def follow(
             text = f"{seen_text:>10}  {event.event:<10}  {event.message}"
         click.echo(
             encode_text(
-                f"{replace_arguments_for_people(text, output.output_format, output.columns)}\n"
+                f"{name_options_and_wrap(text, output.output_format, output.columns)}\n"
             ),
             nl=False,
         )

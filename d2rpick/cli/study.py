@@ -138,6 +138,9 @@ def study(
         lines=[write_row(row, mark) for row in rows]
         if by_line and not streaming
         else [],
+        question=request.repeat()._replace(
+            times=options.write_times(td=td, td_window=td_window), files=sources
+        ),
     )
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")

@@ -188,24 +188,36 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
     )
     notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
     joints = ls_dyna_loads.read_joints(deck)
-    watched = mesh.table.known(_read_watched_nodes(deck))
+    local_nodes = _read_watched_nodes(deck, local=True)
+    watched_nodes = np.union1d(_read_watched_nodes(deck, local=False), local_nodes)
+    watched = mesh.table.known(watched_nodes)
     return Inventory(
         "ls-dyna",
         _build_parts(deck, parts, mesh),
         mesh.elements,
         mesh.coordinates,
-        notes,
+        (*notes, *_note_switching_cards(deck)),
         parts.all_known and not notes,
         joints=place_nodes(joints.found, mesh.table),
         ties=joints.unknown,
         watched=watched,
         watched_ids=mesh.table.ids[watched],
+        local_ids=frozenset(local_nodes.tolist()),
         moved=_has_moved_nodes(deck),
         files=tuple(deck.sources),
         boundary=ls_dyna_loads.read_ls_dyna_boundary(
             deck, parts, (ids, coordinates, codes)
         ).placed(mesh.table),
     )
+
+
+def _note_switching_cards(deck: Deck) -> Iterator[str]:
+    """Yield a note on the first card with which the deck already switches parts."""
+    for card in deck.named("DEFORMABLE_TO_RIGID")[:1]:
+        yield (
+            f"{card.at}: the deck already switches parts with *{card.name}; remove its switching cards before you add "
+            "others"
+        )
 
 
 def find_shared_nodes(
@@ -274,12 +286,15 @@ def _list_nodes(
                 )
 
 
-def _read_watched_nodes(deck: Deck) -> Integers:
-    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title."""
+def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title.
+
+    If ``local`` is True, only those whose motion is written in a local coordinate system, else only the others.
+    """
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
-        if set(options) <= {"ID", "LOCAL"}:
+        if set(options) <= {"ID", "LOCAL"} and ("LOCAL" in options) is local:
             line = make_watched_line(card.width, 1 if options else 8)
             node_ids = [
                 lines.integers(line.layout).ravel()
@@ -304,7 +319,7 @@ def _list_notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
         if not _is_readable(card)
     )
     yield from (
-        f"{include.name.at}: {include.name.text} was not read: {include.reason}"
+        f"{include.name.at}: {include.name.text} was not read: {include.reason}; add the file, or correct its name"
         for include in deck.unread
     )
     for block in deck.encrypted:

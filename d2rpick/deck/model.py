@@ -228,13 +228,16 @@ class Inventory:
     coordinates : array
         Shape (nodes, 3), NaN for a node without coordinates [length].
     notes : tuple of str
-        Cards that cannot be read; ``complete`` is False if elements or parts may be missing because of them.
+        Cards that cannot be read, and a card that already switches parts; ``complete`` is False if elements or parts
+        may be missing.
     joints, switched : tuple of Joint
         Connections of parts that share no nodes, and rigid bodies that exist to be switched.
     ties : tuple of str
         Connections between unknown parts.
     watched, watched_ids : array
         Places of the nodes whose motion the run writes, and their numbers in the deck, both of shape (k,).
+    local_ids : frozenset of int
+        Numbers of the nodes whose motion is written in local axes, which may turn.
     moved : bool
         True if the deck moves nodes away from their coordinates.
     files : tuple of SourceFile
@@ -262,6 +265,7 @@ class Inventory:
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     watched_ids: Places = field(default_factory=lambda: np.empty(0, np.int64))
+    local_ids: frozenset[int] = frozenset()
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
     history_groups: frozenset[int] = frozenset()

@@ -114,8 +114,15 @@ def read_run(path: str, content: bytes | None = None) -> RadiossRun:
         source = SourceFile(name, content)
         head = source.read(0, HEAD)
         if not is_radioss(head):
+            is_ls_dyna = re.search(rb"(?im)^\*KEYWORD", head) is not None
+            found = (
+                "this is an LS-DYNA deck"
+                if is_ls_dyna
+                else "no /BEGIN or /RUN was found"
+            )
+            cure = "; for LS-DYNA see d2rpick first" if is_ls_dyna else ""
             raise DeckError(
-                f"{name}: no /BEGIN or /RUN was found, expected a file of a Radioss run"
+                f"{name}: {found}, a file of a Radioss run was expected{cure}"
             )
         run.deck.sources.append(source)
         if re.search(ENGINE, head):

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from d2rpick.choice.pair.grades import GOOD
-from d2rpick.report.tables import quote_shell_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from d2rpick.choice.pair.candidates import Candidate
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.quality import Grade
-    from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import History
 
     Lines = list[tuple[str, str]]
-
-# _TABLES: formats of tables.
-# _USUAL_ENERGY: name of the column that is used as the energy if the user names none.
-_TABLES: Final = ("csv", "hdf5")
-_USUAL_ENERGY: Final = "internal_energy"
 
 
 def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
@@ -33,34 +25,6 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
     if decision.cure:
         lines.append(("to improve", decision.cure))
     return [*lines, ("expect", describe_expectation(decision))]
-
-
-def name_card_command(
-    history: History, settings: Settings, windows: Sequence[tuple[float, float]]
-) -> str:
-    """Return the options or the command that prints the card for windows, with placeholders for missing arguments."""
-    from d2rpick.deck.printing import SOLVERS, find_solver
-
-    if SOLVERS[find_solver(history.format)].switches == "node":
-        # The deck defines the main nodes of the rigid bodies that contain the parts.
-        if history.parts and settings.bodies is not None:
-            return "-f card"
-        return "-f card --node IDS (the main nodes of the rigid bodies)"
-    if history.parts:
-        return "-f card"
-    # The parts on the card may differ from the parts of the energy, so `card` has separate arguments for both.
-    times = [
-        text
-        for tr, td in windows
-        for text in ("--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
-    ]
-    if history.format in _TABLES and history.channel != _USUAL_ENERGY:
-        energy = ["--energy", history.channel]
-    else:
-        energy = []
-    names = [text for name in history.source for text in ("--history", name)]
-    words = ["d2rpick", "card", *times, "--part", "IDS", *energy, *names]
-    return f"{quote_shell_line(words)} (IDS: the parts to switch)"
 
 
 def describe_expectation(decision: Decision) -> str:
@@ -95,9 +59,15 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     causes = [cause for cause in grade.causes if cause.reason not in decision.reason]
     if not causes:
         return ""
-    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, causes)))
     reasons = "; ".join(cause.reason for cause in causes)
-    return f". Reason: {reasons}. To improve: {cures}"
+    # A better pair is the cure that the verdict names.
+    curable = [
+        cause
+        for cause in causes
+        if not (decision.better is not None and cause.needs_other_times)
+    ]
+    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, curable)))
+    return f". Reason: {reasons}{f'. To improve: {cures}' if cures else ''}"
 
 
 def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:

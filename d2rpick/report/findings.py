@@ -12,6 +12,7 @@ from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, make_printable, name_units
 from d2rpick.base.files import STDIN
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.pair.grades import POOR
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -49,7 +50,7 @@ _NOUNS: Final = (
     "error",
     "warning",
     "info message",
-)  # Singular and plural of the severities error, warning and info.
+)  # Nouns for the severities error, warning and info.
 # This pattern is compiled at its first use, to keep start-up fast.
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
@@ -98,7 +99,7 @@ class Checks:
 
 
 def as_table(checks: Checks, _: DisplayOptions) -> str:
-    """Return one line per finding and per window of each deck, then the numbers of findings and of failed decks."""
+    """Return one line per finding and per window of each deck, the numbers of findings and decks, and the next step."""
     lines: list[str] = []
     for result in checks.results:
         lines.append(_format_path(result.deck, checks.root))
@@ -111,7 +112,43 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
             f"  {_format_finding(finding)}"
             for finding in _list_findings(checks, result)
         ]
-    return "\n".join([*map(make_printable, lines), "", _summarize_findings(checks)])
+    step = f"next  {_name_next_step(checks)}"
+    return "\n".join(
+        [*map(make_printable, lines), "", step, _summarize_findings(checks)]
+    )
+
+
+def _name_next_step(checks: Checks) -> str:
+    """Return what to do after the check, with a command that can be typed."""
+    serious = [
+        finding
+        for result in checks.results
+        for finding in _list_findings(checks, result)
+        if finding.severity is not Severity.INFO
+    ]
+    if serious:
+        explain = tables.quote_shell_line(("d2rpick", "rule", serious[0].rule))
+        return (
+            f"correct the deck where a line above says so; {explain} explains the first"
+        )
+    decks = tables.make_positional([result.deck for result in checks.results])
+    if not any(result.cards for result in checks.results):
+        return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
+    if checks.history is None:
+        command = tables.quote_shell_line(("d2rpick", "check", *decks))
+        return f"judge the times by the reference run: {command} --history HISTORY"
+    history = tables.make_positional(checks.history)
+    grades = [
+        window.decision.grade
+        for result in checks.results
+        for window in result.windows
+        if window.decision
+    ]
+    if POOR in grades:
+        plan = tables.quote_shell_line(("d2rpick", "plan", *history))
+        return f"choose other times with {plan}"
+    compare = tables.quote_shell_line(history)
+    return f"run the deck, and compare the run with d2rpick verify --switched SWITCHED_RUN {compare}"
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:

@@ -41,11 +41,36 @@ class WrittenDeck(NamedTuple):
     passed: bool
 
 
+class RepeatedQuestion(NamedTuple):
+    """Words of the command line with which another command asks about the same run.
+
+    Parameters
+    ----------
+    times : tuple of str
+        Options that only the same command has, such as a given td.
+    parts : tuple of str
+        Options that name the parts to be switched.
+    options : tuple of str
+        All other options that select and judge the run.
+    judging : tuple of str
+        All options and files by which ``card`` judges in the same way.
+    files : tuple of str
+        Files of the history.
+    """
+
+    times: tuple[str, ...] = ()
+    parts: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
+    judging: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+
+
 class DisplayOptions(NamedTuple):
     """Content to show in addition to the answer: the command, the number of rows, and lines that were already written.
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
     and text are no wider than ``width`` columns.  ``written_deck`` is the deck that was written with the answer.
+    ``question`` has the words with which the next command asks about the same run.
     """
 
     command: Sequence[str] = ()
@@ -55,6 +80,7 @@ class DisplayOptions(NamedTuple):
     verbose: bool = False
     width: int = WIDEST
     written_deck: WrittenDeck | None = None
+    question: RepeatedQuestion = RepeatedQuestion()
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:

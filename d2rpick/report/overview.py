@@ -135,7 +135,8 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     lines = [("verdict", overview.verdict), ("why", overview.reason)]
     lines += [("flight", _format_flight(*flight)) for flight in overview.flights]
     if overview.verdict == DO_NOT_USE:
-        cure = None if overview.unjudged else overview.should_write
+        is_known = overview.unjudged or overview.rigid
+        cure = None if is_known else overview.should_write
         return [*lines, ("to improve", cure)] if cure else lines
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []

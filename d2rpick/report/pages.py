@@ -24,6 +24,7 @@ from d2rpick.report.decision import (
     list_verdict_lines,
 )
 from d2rpick.report.explorer import build_explorer, read_scripts, read_styles
+from d2rpick.report.formats import RepeatedQuestion
 from d2rpick.report.page import (
     Explorer,
     Markup,
@@ -314,6 +315,7 @@ def plan_page(
     command: Sequence[str],
     card: str | None,
     explored: Explorer | None = None,
+    question: RepeatedQuestion | None = None,
 ) -> str:
     """Write the page of ``plan``.
 
@@ -328,6 +330,8 @@ def plan_page(
         Solver input for the next run, if the parts to be switched are known.
     explored : Explorer, optional
         The flights of the plan.
+    question : RepeatedQuestion, optional
+        Words with which the next command asks about the same run.
     """
     cards = [_build_window_card(row, answer) for row in answer.supported]
     cards = cards or [page.build_refusal("No window of this run can be recommended.")]
@@ -345,7 +349,7 @@ def plan_page(
             build_pairs(
                 [
                     ("plan", plan.give_plan_sentence(answer)),
-                    *plan.list_next_steps(answer),
+                    *plan.list_next_steps(answer, question or RepeatedQuestion()),
                     *plan.list_plan_remarks(answer),
                 ]
             ),

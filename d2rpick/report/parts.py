@@ -19,6 +19,8 @@ from d2rpick.report.fields import (
     row,
     write_csv,
 )
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -246,7 +248,9 @@ DOCUMENT: Final = Document(
 
 def as_table(answer: Parts, display: DisplayOptions) -> str:
     """Return the recommended set, the next command, a table of the sets, two tables of the parts, and the input."""
-    lines = tables.format_in_line(list_verdict_on_set(answer))
+    lines = tables.format_in_line(
+        (*list_verdict_on_set(answer), *list_next_step(answer, display.question))
+    )
     if answer.sets:
         lines += [
             "",
@@ -260,10 +264,12 @@ def as_table(answer: Parts, display: DisplayOptions) -> str:
     return "\n".join([*lines, "", *tables.format_in_line(below)])
 
 
-def as_markdown(answer: Parts, _: DisplayOptions) -> str:
+def as_markdown(answer: Parts, display: DisplayOptions) -> str:
     """Return the recommended set, the sets and the parts as Markdown tables, and the input."""
     sets = [tables.as_markdown(*build_set_table(answer))] if answer.sets else []
-    above = tables.format_as_list(list_verdict_on_set(answer))
+    above = tables.format_as_list(
+        (*list_verdict_on_set(answer), *list_next_step(answer, display.question))
+    )
     below = tables.format_as_list(list_remarks(answer))
     return "\n\n".join(
         [*above, *sets, tables.as_markdown(*build_part_table(answer)), *below]
@@ -357,7 +363,7 @@ def name_verdict(row: PartRow) -> str:
 
 
 def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
-    """Return which parts to make rigid, why, and the next command, as (name, sentence) pairs."""
+    """Return which parts to make rigid, why, and what that saves, as (name, sentence) pairs."""
     best = answer.recommended
     if best is None and answer.inventory is None:
         return [
@@ -393,11 +399,23 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
             f"--part {format_part_ranges(best.parts)}, {name_set(best)} ({bodies})",
         ),
         ("saves", saves),
-        (
-            "next",
-            f"d2rpick plan --part {format_part_ranges(best.parts)} with the same files",
-        ),
     ]
+
+
+def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
+    """Return the next command: to the plan with the recommended set, or to all td if its pair cannot be used."""
+    best = answer.recommended
+    if best is None:
+        parts: Sequence[str] = ()
+        command = "plan"
+        if answer.inventory is not None:
+            command = "info"
+            question = RepeatedQuestion(files=question.files)
+    else:
+        parts = [format_part_ranges(best.parts)]
+        is_refused = best.decision is not None and best.decision.verdict == DO_NOT_USE
+        command = "explore" if is_refused else "plan"
+    return [("next", write_command(question, command, new_parts=parts))]
 
 
 def _explain_no_part(answer: Parts) -> str:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import make_printable
+from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
     format_in_full,
     format_saved_share,
-    name_card_command,
 )
 from d2rpick.report.fields import (
     Document,
@@ -22,6 +21,11 @@ from d2rpick.report.fields import (
     row,
     write_csv,
 )
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import describe_input
 from d2rpick.report.suggestion import describe_given_up_time
 
@@ -30,7 +34,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.td.plan import PlannedFlight, RunPlan
-    from d2rpick.report.formats import DisplayOptions, WrittenDeck
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
 # The run in which the parts can be switched in a window, keyed by status of the window.
@@ -212,7 +216,9 @@ def as_table(plan: RunPlan, display: DisplayOptions) -> str:
         below += _list_position_errors(plan)
     printable = [(name, make_printable(text)) for name, text in below]
     above = tables.format_in_line([("history", describe_input(plan.history))], 8)
-    steps = tables.format_in_line(list_next_steps(plan, display.written_deck), 4)
+    steps = tables.format_in_line(
+        list_next_steps(plan, display.question, display.written_deck), 4
+    )
     return "\n".join(
         [
             give_plan_sentence(plan),
@@ -230,6 +236,12 @@ def give_plan_sentence(plan: RunPlan) -> str:
     """Return the recommended action in one sentence."""
     supported = [row for row in plan.supported if row.window]
     waiting = len(plan.all_windows) - len(supported)
+    if not supported and plan.done:
+        windows = list_names(["{:.6g} to {:.6g}".format(*times) for times in plan.done])
+        return (
+            f"{DO_NOT_USE} any window of this run: it was switched, with rigid parts from {windows}, and no later "
+            "flight can be used"
+        )
     if not supported:
         return "do not use any window of this run now" + "; see below" * bool(
             plan.flights
@@ -277,20 +289,30 @@ def _name_flights(numbers: Sequence[int]) -> str:
 
 
 def list_next_steps(
-    plan: RunPlan, written_deck: WrittenDeck | None = None
+    plan: RunPlan,
+    question: RepeatedQuestion,
+    written_deck: WrittenDeck | None = None,
 ) -> list[tuple[str, str]]:
     """Return the next commands for the windows that can be used now, as (name, command) pairs.
 
     If the deck has already been written with the cards, the next step is to run it.
     """
     if not plan.windows:
-        return []
+        return _list_step_without_window(plan, question)
     waiting = any(row.status == "re-plan" for row in plan.flights)
-    command = name_card_command(plan.history, plan.settings, plan.next_run)
-    cards = f"print the cards with {command}"
+    cards = name_step_to_card(
+        plan.history,
+        plan.settings,
+        plan.next_run,
+        question,
+        "plan",
+        flying=any(row.flight.by_parts for row in plan.flights),
+    )
     if plan.done:
-        cards += " (they also contain the windows that are done)"
-    step = f"{cards}, add them to the deck, and run the deck from t = 0"
+        cards += "; they also contain the windows that are done"
+    step = f"{cards}. Then add them to the deck, and run the deck from t = 0"
+    if cards.startswith("choose"):
+        step = cards
     if written_deck:
         step = f"run the deck in {written_deck.folder} from t = 0"
         if not written_deck.passed:
@@ -299,6 +321,21 @@ def list_next_steps(
         ". Then plan the remaining flights from that run (--done)" if waiting else ""
     )
     return [("next", f"{step}{again}")]
+
+
+def _list_step_without_window(
+    plan: RunPlan, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command of a plan without a window that can be used now."""
+    rows = [row for row in plan.flights if row.answer and not row.done]
+    if not rows:
+        return []
+    answer = max(rows, key=lambda row: row.end - row.start).answer
+    assert answer is not None
+    better = answer.decision.better if answer.decision else None
+    otherwise = f"compare all td with {write_command(question, 'explore')}"
+    step = name_step_after_refusal(answer.situation, better, question, otherwise)
+    return [("next", step)]
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
@@ -314,7 +351,7 @@ def as_markdown(plan: RunPlan, display: DisplayOptions) -> str:
     """Return the flights as a Markdown table, with the saving and the reasons against windows below."""
     below = tables.format_as_list(
         (
-            *list_next_steps(plan, display.written_deck),
+            *list_next_steps(plan, display.question, display.written_deck),
             *list_verdicts(plan),
             *list_plan_remarks(plan),
             *list_reasons(plan),

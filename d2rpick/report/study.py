@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.pair.grades import VERDICTS
+from d2rpick.choice.pair.grades import GRADES, POOR, VERDICTS
 from d2rpick.choice.runs.study import (
     OK,
     StudyOfRuns,
@@ -28,6 +28,8 @@ from d2rpick.report.fields import (
     row,
     write_csv,
 )
+from d2rpick.report.formats import RepeatedQuestion
+from d2rpick.report.next_step import write_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -146,7 +148,11 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
         )
     ]
     outcome_lines = tables.format_in_line(
-        [*list_outcome(answer), *list_run_reasons(answer)]
+        [
+            *list_outcome(answer),
+            *list_run_reasons(answer),
+            *list_next_step(answer, display.question),
+        ]
     )
     return "\n".join(
         [
@@ -159,10 +165,14 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
     )
 
 
-def as_markdown(answer: StudyOfRuns, _: DisplayOptions) -> str:
+def as_markdown(answer: StudyOfRuns, display: DisplayOptions) -> str:
     """Return the results common to all runs, and a Markdown table of the runs."""
     outcome_lines = tables.format_as_list(
-        [*list_outcome(answer), *list_run_reasons(answer)]
+        [
+            *list_outcome(answer),
+            *list_run_reasons(answer),
+            *list_next_step(answer, display.question),
+        ]
     )
     listed = "\n".join(f"* {line}" for line in outcome_lines)
     return f"{listed}\n\n{tables.as_markdown(*build_run_table(answer))}"
@@ -316,6 +326,30 @@ def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
         )
         for (verdict, reason, cure), count in causes.most_common(_MOST_REASONS)
     ]
+
+
+def list_next_step(
+    answer: StudyOfRuns, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to one td for all runs, to the verdict on the common pair, or to the worst run."""
+    judged = [row for row in answer.runs if row.verdict and row.td is not None]
+    if not judged:
+        first = RepeatedQuestion(files=question.files[:1])
+        return [("next", f"look at the first run with {write_command(first, 'info')}")]
+    worst = min(judged, key=lambda row: GRADES.index(row.quality or POOR))
+    of_worst = question._replace(files=(worst.source,))
+    if worst.quality == POOR or answer.common.tr is None:
+        line = write_command(of_worst, "suggest", *question.times)
+        step = f"look at the first of the worst runs with {line}"
+    elif answer.td is None:
+        earliest = min(row.td for row in judged if row.td is not None)
+        line = write_command(question, "study", "--td", f"{earliest:.6g}")
+        step = f"choose one td for all runs, for example the earliest, with {line}"
+    else:
+        times = ("--tr", f"{answer.common.tr:.6g}", "--td", f"{answer.td:.6g}")
+        line = write_command(of_worst, "verify", *times)
+        step = f"judge the common pair in the worst run with {line}"
+    return [("next", step)]
 
 
 def describe_td(answer: StudyOfRuns) -> str:

@@ -16,10 +16,14 @@ from d2rpick.report.decision import (
     list_numbered_reasons,
     list_statements,
     list_verdict_lines,
-    name_card_command,
     number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import AcceptableWindow, PairSuggestion
     from d2rpick.choice.pair.candidates import Candidate, Pair
     from d2rpick.choice.pair.decision import Decision
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 # Largest number of windows of acceptable tr that are listed on one line of text.
 _NAMED = 4
@@ -36,7 +40,14 @@ _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
-# JSON fields of a candidate and of the decision on it.
+# A pair with the decision on it.
+_JUDGED_PAIR: Final = row(
+    *keys.PAIR.fields,
+    Field("verdict", keys.VERDICT),
+    Field("verdict_reason", "text"),
+    later=("verdict", "verdict_reason"),
+)
+# A candidate and the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
     keys.NO_PARTS,
@@ -73,6 +84,15 @@ def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | N
     ]
 
 
+def _judge_pair_at_better_td(answer: PairSuggestion) -> dict[str, Any] | None:
+    """Return the pair at a better td with the verdict of ``verify``."""
+    better, decision = answer.better_pair, answer.decision_on_better
+    if better is None or decision is None:
+        return None
+    pair = {"td": better.td, "tr": better.tr, "residual": better.residual}
+    return {**pair, "verdict": decision.verdict, "verdict_reason": decision.reason}
+
+
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
     *keys.FRAME,
     Field("td", "number"),
@@ -89,9 +109,9 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     *keys.QUALITY,
     keys.HEALTH,
     keys.EXPECTED,
-    Field("better_td", maybe(keys.PAIR), "pair at a better td; null if there is none, or if it is the recommended "
-                                         "pair",
-          lambda answer: answer.better_pair),
+    Field("better_td", maybe(_JUDGED_PAIR), "pair at a better td; null if there is none, or if it is the recommended "
+                                            "pair",
+          _judge_pair_at_better_td),
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),
 ))  # fmt: skip
@@ -105,7 +125,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
     above = list_situation_heading(answer.situation, verbose=display.verbose)
     listed = answer.candidates[: display.limit]
     lines = [
-        *tables.format_in_line((*list_verdict(answer), *list_next_step(answer))),
+        *tables.format_in_line(
+            (*list_verdict(answer), *list_next_step(answer, display.question))
+        ),
         "",
         *tables.format_in_line(
             (*list_evidence(answer), *list_alternatives(answer), *above)
@@ -126,7 +148,9 @@ def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
 
 def as_markdown(answer: PairSuggestion, display: DisplayOptions) -> str:
     """Return the verdict, the candidates as a Markdown table, and the evidence for the verdict below it."""
-    above = tables.format_as_list((*list_verdict(answer), *list_next_step(answer)))
+    above = tables.format_as_list(
+        (*list_verdict(answer), *list_next_step(answer, display.question))
+    )
     below = tables.format_as_list((*list_evidence(answer), *list_alternatives(answer)))
     table = tables.as_markdown(*_select_shown_candidates(answer, display))
     listed = answer.candidates[: display.limit]
@@ -200,21 +224,45 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
     return lines
 
 
-def list_next_step(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return the next command; empty if the pair cannot be used."""
+def list_next_step(
+    answer: PairSuggestion, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of a pair that can be used, otherwise to a better pair."""
     decision = answer.decision
-    if decision is None or decision.verdict == DO_NOT_USE:
-        return []
     situation = answer.situation
     pair = answer.recommended
-    windows = [(pair.tr, pair.td)] if pair else []
-    command = name_card_command(situation.history, situation.settings, windows)
-    return [
-        (
-            "next",
-            f"print the cards with {command}, or a page of the evidence with --report FILE",
+    if decision is None or pair is None or decision.verdict == DO_NOT_USE:
+        step = _name_step_after_refusal(answer, decision, question)
+    else:
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(pair.tr, pair.td)],
+            question,
+            "suggest",
+            flying=situation.flight.by_parts,
         )
-    ]
+    return [("next", step)]
+
+
+def _name_step_after_refusal(
+    answer: PairSuggestion, decision: Decision | None, question: RepeatedQuestion
+) -> str:
+    """Return the step after an answer without a pair that can be used."""
+    better = decision.better if decision else answer.clearly_better
+    judged = answer.decision_on_better
+    if decision is None and judged is not None and judged.verdict == DO_NOT_USE:
+        better = None
+    if answer.td_window is not None:
+        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+    elif decision is None and answer.situation.flight.start is not None:
+        otherwise = (
+            f"let d2rpick choose both times with {write_command(question, 'suggest')}"
+        )
+    else:
+        line = write_command(question, "explore", *question.times)
+        otherwise = f"compare other td with {line}"
+    return name_step_after_refusal(answer.situation, better, question, otherwise)
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.choice.pair.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -13,13 +14,18 @@ from d2rpick.report.decision import (
     number_reasons,
 )
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import describe_input
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.td.trade_off import Offer, TradeOff
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 OFFER: Final = row(
     Field("td", "number"),
@@ -83,7 +89,12 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     low, high = trade_off.td_window
     window = f"{len(trade_off.offers)} times from {low:.6g} to {high:.6g}"
     lines = [
-        *tables.format_in_line(list_answer_lines(trade_off)),
+        *tables.format_in_line(
+            (
+                *list_answer_lines(trade_off),
+                *list_next_step(trade_off, display.question),
+            )
+        ),
         "",
         offered,
         *tables.format_in_line(list_offer_reasons(listed_offers)),
@@ -109,6 +120,33 @@ def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
         *_list_verdict_of_requested(trade_off, trade_off.requested),
         *_list_choice_if_td_is_free(trade_off, trade_off.requested),
     ]
+
+
+def list_next_step(
+    trade_off: TradeOff, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of the requested or chosen pair if it can be used, or to a better pair."""
+    offer = trade_off.requested or trade_off.recommended
+    decision = trade_off.decide_on(offer) if offer else None
+    situation = trade_off.situation
+    if offer is None or offer.tr is None or decision is None:
+        step = f"compare all flights with {write_command(question, 'plan')}"
+    elif decision.verdict == DO_NOT_USE:
+        otherwise = f"compare all flights with {write_command(question, 'plan')}"
+        step = name_step_after_refusal(
+            offer.answer.situation, decision.better, question, otherwise
+        )
+    else:
+        times = ("--td", f"{offer.td:.6g}")
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(offer.tr, offer.td)],
+            question._replace(times=times),
+            "suggest",
+            flying=situation.flight.by_parts,
+        )
+    return [("next", step)]
 
 
 def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
@@ -164,12 +202,23 @@ def list_costs_of_other_offers(trade_off: TradeOff) -> list[tuple[str, str]]:
     accurate = trade_off.more_accurate
     if accurate:
         cost_text = _describe_cost_change(best, accurate)
-        lines.append(("smaller error", f"{_describe_error_at(accurate)} {cost_text}"))
+        warned = _warn_about_refused(accurate)
+        lines.append(
+            ("smaller error", f"{_describe_error_at(accurate)}{warned} {cost_text}")
+        )
     longest = trade_off.start
     if longest and (longest.rigid_time or 0.0) > (best.rigid_time or 0.0):
         cost_text = _describe_cost_change(best, longest)
-        lines.append(("longest", f"{_describe_error_at(longest)} {cost_text}"))
+        warned = _warn_about_refused(longest)
+        lines.append(("longest", f"{_describe_error_at(longest)}{warned} {cost_text}"))
     return lines
+
+
+def _warn_about_refused(offer: Offer) -> str:
+    """Return the verdict in parentheses if the pair of an offer cannot be used; otherwise an empty string."""
+    decision = offer.decision
+    refused = decision is not None and decision.verdict == DO_NOT_USE
+    return f" ({DO_NOT_USE})" if refused else ""
 
 
 def _describe_offer(offer: Offer) -> str:
@@ -192,7 +241,12 @@ def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
     reasons = tables.format_as_list(list_offer_reasons(listed_offers))
     return "\n\n".join(
         [
-            *tables.format_as_list(list_answer_lines(trade_off)),
+            *tables.format_as_list(
+                (
+                    *list_answer_lines(trade_off),
+                    *list_next_step(trade_off, display.question),
+                )
+            ),
             *reasons,
             tables.as_markdown(*offer_table),
         ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import make_printable
+from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.choice.switched.comparison import MOST_MOMENTUM_ERROR
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (
@@ -15,12 +16,17 @@ from d2rpick.report.decision import (
     list_verdict_lines,
 )
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
+from d2rpick.report.next_step import (
+    name_step_after_refusal,
+    name_step_to_card,
+    write_command,
+)
 from d2rpick.report.situation import list_situation_heading
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import PairVerdict
     from d2rpick.choice.switched.comparison import Comparison
-    from d2rpick.report.formats import DisplayOptions
+    from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
 # Fields of the judged pair, of its measured values, and of the verdict.
 MEASURES: Final = row(
@@ -73,7 +79,10 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
-    verdict_lines = list_pair_verdict(answer)
+    verdict_lines = [
+        *list_pair_verdict(answer),
+        *list_next_step(answer, display.question),
+    ]
     if answer.switched:
         verdict_lines = [list_comparison_verdict(answer.switched), *verdict_lines]
     lines = tables.format_in_line(verdict_lines)
@@ -95,6 +104,33 @@ def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
 def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
     """Return what to do with the pair, why, and how to improve it, as (name, sentence) pairs."""
     return list_verdict_lines(answer.decision, answer.candidate.tr, answer.td)
+
+
+def list_next_step(
+    answer: PairVerdict, question: RepeatedQuestion
+) -> list[tuple[str, str]]:
+    """Return the next command: to the card of a pair that can be used, a page on its switched run, or a better pair."""
+    decision = answer.decision
+    situation = answer.situation
+    if decision.verdict == DO_NOT_USE:
+        line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
+        step = name_step_after_refusal(
+            situation, decision.better, question, f"compare other td with {line}"
+        )
+    elif answer.switched:
+        words = (*question.times, "--report", "verify.html")
+        line = write_command(question, "verify", *words)
+        step = f"use the results of the switched run; keep the comparison with {line}"
+    else:
+        step = name_step_to_card(
+            situation.history,
+            situation.settings,
+            [(answer.candidate.tr, answer.td)],
+            question,
+            "card",
+            flying=situation.flight.by_parts,
+        )
+    return [("next", step)]
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
@@ -149,12 +185,17 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
     return [row for row in rows if row[1] is not None]
 
 
-def as_markdown(answer: PairVerdict, _: DisplayOptions) -> str:
+def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
     """Return the verdict, and the values of the pair as a Markdown table with two columns."""
     switched = answer.switched
     comparison_lines = [list_comparison_verdict(switched)] if switched else []
     paragraphs = tables.format_as_list(
-        (*comparison_lines, *list_pair_verdict(answer), *list_pair_evidence(answer))
+        (
+            *comparison_lines,
+            *list_pair_verdict(answer),
+            *list_next_step(answer, display.question),
+            *list_pair_evidence(answer),
+        )
     )
     table = tables.as_markdown(("measure", "value"), list_known_measures(answer))
     if switched:

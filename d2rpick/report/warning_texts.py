@@ -67,8 +67,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Neither the parts nor the motion of nodes shows how the body rotates in the flight. If you give the "
             "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
             "contact may be large. Without the deck, the margin may be too short.",
-            "Give the deck with --deck. In a Radioss run, also write the motion of at least three nodes of the body "
-            "that do not lie on a line (/TH/NODE). For other solvers, set the margin with --margin.",
+            "Give the deck with --deck, and write the motion of at least three nodes of the body that do not lie on "
+            "a line: /TH/NODE of Radioss, *DATABASE_HISTORY_NODE of LS-DYNA with the binout or nodout. Otherwise set "
+            "the margin with --margin.",
         ),
         "td-after-contact": Explanation(
             "The next contact begins before td, or td lies within the margin before it. The parts would hit something "
@@ -250,7 +251,8 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Nothing to do if it is the deck of this run. Otherwise give another deck with --deck, or use --no-deck.",
         ),
         "deck-not-followed": Explanation(
-            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor. It uses the history instead.",
+            "d2rpick cannot evaluate a part of the deck, such as a curve or a sensor, and uses the history instead. Or "
+            "the deck already contains switching cards, which the answer does not consider.",
             "Check the named line. If it is a load, give its end with --after.",
         ),
         "deck-of-another-model": Explanation(

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.span import Span
 
+# A time without states is a gap if it is this many times as long as the usual output interval [-].
+_GAP: Final = 10.0
 # Reason why no tr can be trusted if the vibration at td is below the noise.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
@@ -506,6 +508,15 @@ def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
     text = f"the energy has {states:.3g} states per period"
-    return (
-        f"{text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
-    )
+    needed = f"at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies"
+    return (f"{text}{_describe_gap(time)}, {needed}",)
+
+
+def _describe_gap(time: Samples) -> str:
+    """Return the longest interval without states as text, if it is much longer than the others."""
+    steps = np.diff(time)
+    longest = int(np.argmax(steps))
+    if steps[longest] <= _GAP * float(np.median(steps)):
+        return ""
+    start, end = time[longest : longest + 2]
+    return f" (no states from {start:.6g} to {end:.6g})"

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import PairVerdict, compare_with, verify_run
+from d2rpick.choice.answers import PairVerdict, verify_run
 from d2rpick.choice.question import Settings
+from d2rpick.choice.switched.compared_verdict import add_comparison
 from d2rpick.choice.switched.comparison import (
     MOST_MOMENTUM_ERROR,
     Comparison,
@@ -694,7 +695,7 @@ def compare_car(run: str, *parts: str) -> PairVerdict:
     """Return the verdict on the car with engine, battery and wheels as six rigid bodies, or as one."""
     solved_run = read_solved("carT01.gz", *parts)
     verdict = verify_run(solved_run, CAR_TR, CAR_TD, Settings())
-    return compare_with(
+    return add_comparison(
         verdict,
         solved_run,
         solved_run.like(open_run(list_legs(run), Selection()), Selection(parts=parts)),

@@ -47,7 +47,7 @@ DECK_OF_ANOTHER_MODEL = (
         ),
         (
             f"suggest --channel kinetic=total_energy {MATSUM}",
-            "QUANTITY=NAME was expected (did you mean 'kinetic_energy'?)",
+            "unknown quantity 'kinetic' (did you mean 'kinetic_energy'?), one of ",
         ),
         (
             "card --solver ls-dyn --tr 0.06 --td 0.07 --part 1",
@@ -70,9 +70,7 @@ def test_a_mistake_is_answered_with_its_cure(arguments: str, message: str) -> No
 def test_a_table_with_one_column_is_named_so(tmp_path: Path) -> None:
     table = tmp_path / "one.csv"
     table.write_text("internal_energy\n" + "1.5\n" * 20)
-    assert "this file has one column; add the times" in read_refusal(
-        "suggest", str(table)
-    )
+    assert "only one column, '1.5', was found" in read_refusal("suggest", str(table))
 
 
 def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
@@ -87,7 +85,10 @@ def test_a_line_of_a_window_names_what_was_expected(tmp_path: Path) -> None:
     [
         (
             " Livermore Software Technology\n" + " text\n" * 60,
-            "this is a listing of LS-DYNA; give the glstat, matsum or binout of the run",
+            (
+                "this is a listing of LS-DYNA; a table of time and energy was expected; give the "
+                "glstat, matsum or binout of the run"
+            ),
         ),
         (
             "time,internal_energy\n0,1\n1,2\n",
@@ -178,8 +179,11 @@ def test_a_record_with_few_states_names_the_interval_to_ask_for(tmp_path: Path) 
     assert document["verdict"] == "do not use"
     states, start = 5, document["flight"]["start"]
     assert (
-        f"write the energies every {(0.064 - start) / 200:.2g} or more often, because only {states} states lie"
+        f"write the energies every {(0.064 - start) / 200:.2g} or more often"
         in document["cure"]
+    )
+    assert (
+        f"because only {states} states lie in the flight" in document["verdict_reason"]
     )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.choice.pair.grades import VERDICTS
 from d2rpick.choice.pair.quality import Cause, Grade, Quality, omit_comparison
 from tests.command import (
     BOX,
@@ -35,16 +36,17 @@ def test_the_step_to_the_card_names_the_option_that_the_card_needs(
     command: str,
 ) -> None:
     text = find_line("next", command, ENERGY)
-    match = re.search(r"with d2rpick (card .*) \(IDS", text)
+    match = re.search(r"with d2rpick (card .*) \(ids of your parts instead of 1", text)
     assert match
-    card = run(*shlex.split(match[1].replace("IDS", "1")))
+    card = run(*shlex.split(match[1]))
     assert card.exit_code == 0
     assert "*DEFORMABLE_TO_RIGID" in card.stdout
 
 
 def test_the_step_to_the_card_of_a_radioss_run_names_the_nodes() -> None:
     text = find_line("next", "suggest", "--part", "flying", BOX)
-    assert "-f card --node IDS" in text
+    assert "-f card --node 1001" in text
+    assert "(main nodes of your rigid bodies instead of 1001)" in text
 
 
 def test_after_the_deck_is_written_the_next_step_is_to_run_it(tmp_path: Path) -> None:
@@ -150,3 +152,103 @@ def test_after_the_comparison_with_a_switched_run_none_is_asked_for() -> None:
     quality = omit_comparison(Quality(grade, grade, grade))
     cures = {cause.cure for cause in (*quality.causes, *quality.alone.causes)}
     assert cures == {"write more often"}
+
+
+WITH_CARE = ("--tr", "0.123689", "--td", "0.37", "--part", "flying")
+DO_NOT_USE = ("--tr", "0.09", "--td", "0.37", "--part", "flying")
+FLYING = ("--part", "flying", MATSUM)
+BOX_ONLY = ("--part", "box", MATSUM)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("suggest", ENERGY),
+        pytest.param(
+            ("suggest", "--energy", "boxIE_J", ROLLOVER), marks=pytest.mark.slow
+        ),
+        ("suggest", MATSUM),
+        ("suggest", *FLYING),
+        ("suggest", "--td", "0.37", *FLYING),
+        ("suggest", "--td", "0.064", ENERGY),
+        ("suggest", "--td", "0.064", *BOX_ONLY),
+        pytest.param(("suggest", "--part", "flying", BOX), marks=pytest.mark.slow),
+        ("plan", ENERGY),
+        ("plan", "--deck", DECK, "--part", "recommended", MATSUM),
+        ("plan", "--deck", DECK, "--part", "1", MATSUM),
+        ("explore", ENERGY),
+        ("explore", "--td", "0.064", ENERGY),
+        ("explore", *FLYING),
+        ("explore", *BOX_ONLY),
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
+        ("verify", "--tr", "0.0135", "--td", "0.064", ENERGY),
+        ("verify", *WITH_CARE, MATSUM),
+        ("verify", *WITH_CARE[:4], MATSUM),
+        ("verify", "--deck", DECK, *WITH_CARE, MATSUM),
+        ("verify", *DO_NOT_USE, MATSUM),
+        ("parts", MATSUM),
+        ("parts", "--deck", DECK, MATSUM),
+        ("study", ENERGY, ENERGY),
+        ("study", "--td", "0.0687534", ENERGY),
+        ("study", "--td", "0.064", ENERGY),
+        ("info", MATSUM),
+    ],
+    ids=" ".join,
+)
+def test_the_next_command_can_be_typed_as_it_stands(arguments: tuple[str, ...]) -> None:
+    text = find_line("next", *arguments)
+    match = re.search(r"d2rpick (.*?)( \(|\. Then|$)", text)
+    assert match, text
+    step = run(*shlex.split(match[1]))
+    assert step.exit_code in (0, 1), step.stderr
+    assert any(
+        verdict in step.stdout.lower()
+        for verdict in (*VERDICTS.values(), "written by d2rpick")
+    )
+
+
+@pytest.mark.parametrize("text", ["suggest --td 0.37", "explore --td 0.37"])
+def test_verify_and_the_choice_give_one_cure_for_a_pair(text: str) -> None:
+    cure = find_line("to improve", "verify", *WITH_CARE, MATSUM)
+    assert cure.startswith("no clearly better pair was found for td from 0.086 to ")
+    assert find_line("to improve", *text.split(), *FLYING) == cure
+    assert find_line("to improve", "suggest", *FLYING) == cure
+    assert find_line("to improve", "explore", *FLYING) == cure
+
+
+def test_a_td_next_to_a_good_one_is_improved_by_naming_it() -> None:
+    times = ("--tr", "0.0127221", "--td", "0.1455")
+    cure = find_line("to improve", "verify", *times, ENERGY)
+    assert cure.startswith("use tr = 0.0127221, td = 0.144192")
+
+
+def test_a_set_that_cannot_be_used_is_not_recommended_beside_one_that_can() -> None:
+    result = run("parts", "--deck", DECK, "--td", "0.13", MATSUM)
+    assert result.stdout.startswith("use with care  make rigid --part 1,2")
+
+
+def test_no_form_of_output_names_an_argument_of_python() -> None:
+    for form in ("table", "json", "csv", "markdown"):
+        text = run("suggest", "--td", "0.2", "-f", form, *BOX_ONLY).stdout
+        assert re.search(r"`\w+`", text) is None
+
+
+def test_a_pair_at_a_better_td_has_its_verdict_in_json() -> None:
+    better = run_json("suggest", "--td", "0.064", *BOX_ONLY)["better_td"]
+    assert better["verdict"] == "do not use"
+    assert better["verdict_reason"].startswith("it is unknown whether")
+
+
+def test_a_mistyped_option_is_compared_with_the_nearest_only() -> None:
+    assert "Did you mean '--td'?" in run("suggest", "--tdd", "1", ENERGY).stderr
+
+
+def test_a_deck_that_already_switches_its_parts_is_named(tmp_path: Path) -> None:
+    options = ("--part", "1,2", "--deck", DECK)
+    assert "already switches" not in run("plan", *options, MATSUM).stderr
+    folder = tmp_path / "next"
+    run("plan", *options, "--write-deck", str(folder), MATSUM)
+    deck = str(folder / "rollover_box.k")
+    text = run("plan", "--part", "1,2", "--deck", deck, MATSUM).stderr
+    assert "the deck already switches parts with *DEFORMABLE_TO_RIGID_AUTOMATIC" in text
+    assert "remove its switching cards" in text

@@ -723,7 +723,9 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     result = run("suggest", "--td", "0.38", "--part", "box", MATSUM)
     assert result.exit_code == 1
     first, second, *_ = result.stdout.split("\n")
-    assert first == "no pair to use  td = 0.38: td after the end of the flight at 0.379"
+    assert (
+        first == "no pair to use  td = 0.38 lies after the end of the flight at 0.379"
+    )
     assert second.startswith("better pair     tr = 0.0970304, td = 0.37")
     assert " verdict" not in result.stdout
     assert "no-candidate" not in result.stderr

@@ -26,7 +26,7 @@ REFUSALS = f"""
 sugest --td 1 x | No such command 'sugest' | Did you mean 'suggest'? | d2rpick --help
 dance | No such command 'dance' | plan, suggest
 # click words this in its own way in each version; the near names stand in all
-suggest --tdd 1 x | --tdd | --td-window | d2rpick suggest --help
+suggest --tdd 1 x | --tdd | Did you mean '--td'? | d2rpick suggest --help
 verify --tolerence 1 x | --tolerence | --tolerance
 suggest --td 1 --td-window 1 2 x | --td | --td-window
 verify --td 1 x | --tr

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from d2rpick.api.option_names import ARGUMENTS, find_option, replace_arguments
 from d2rpick.cli import COMMANDS
-from d2rpick.cli.output import ARGUMENTS, find_option, replace_arguments
 from tests.command import ENERGY, ROLLOVER, ROOT, join_wrapped_lines, run
 
 # Layers whose messages name no options.
@@ -60,6 +60,6 @@ def test_the_command_line_names_the_option_that_cures() -> None:
         run("study", "--td", "0.37", ROLLOVER).stdout
     )
     assert (
-        "choose with `energy`: "
+        "choose with --energy: "
         in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout
     )

@@ -364,7 +364,8 @@ class Candidates(Sequence[Candidate]):
         is_kept = residual is None or residual <= POOR_RESIDUAL
         if values["same_swing"]:
             notes.append(_SAME_SWING)
-        notes += _list_remarks(situation, reach, values if is_compared else {})
+        measured = values if is_compared else {}
+        notes += _list_remarks(situation, reach, measured, notes)
         level_ratio = None
         if situation.energy_td > 0 and not situation.at_rest:
             level_ratio = values["energy"] / situation.energy_td
@@ -481,10 +482,13 @@ def _list_remarks(
     situation: Situation,
     reach: float,
     measured: Mapping[str, Any],
+    objections: Sequence[str],
 ) -> Iterator[str]:
-    """Yield the notes on a tr that do not make the tr unacceptable."""
+    """Yield the notes on a tr, other than the objections, that do not make the tr unacceptable."""
+    undescribed = situation.vibration.undescribed
     if not (measured or situation.vibration.unknown or situation.at_rest):
-        yield f"direction, frozen-deformation error and residual unknown: {situation.vibration.undescribed}"
+        why = "" if undescribed in objections else f": {undescribed}"
+        yield f"direction, frozen-deformation error and residual unknown{why}"
     if measured and measured["residual_high"] > measured["residual"] + MUCH_HIGHER:
         yield f"residual up to {measured['residual_high']:.2g} if the record hides a further mode"
     if measured and reach > measured["timing_tolerance"]:

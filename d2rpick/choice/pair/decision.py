@@ -31,10 +31,12 @@ CHECK_SWITCHED_RUN: Final = (
 # _USE_BEST: advice if the best pair in the given range of td can be used with care.
 # _AVOID_BEST: advice if even the best pair in the given range of td cannot be used.
 _USE_BEST: Final = (
-    "use this pair if only the motion matters, compare it with a finished switched run (d2rpick verify), "
-    "or make fewer parts rigid (d2rpick parts)"
+    "use this pair if only the motion matters, or compare it with a finished switched run "
+    "(d2rpick verify)"
 )
-_AVOID_BEST: Final = "choose another flight, or make other parts rigid (d2rpick parts)"
+_AVOID_BEST: Final = "choose another flight, or make other parts rigid"
+# _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
+_USE_COMPARED: Final = "use this pair if only the motion matters"
 # The worst case is shown only if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
@@ -64,6 +66,8 @@ class Decision(NamedTuple):
         What to do about the objections if there is no better pair.
     best_of : (float, float) or None
         Range of td of which the pair is the best [time]; None if not all its td were compared.
+    is_compared : bool
+        True if a finished switched run was compared with the reference run.
     """
 
     grade: str
@@ -76,6 +80,7 @@ class Decision(NamedTuple):
     better: Pair | None = None
     cure_of_objections: str = CHOOSE_ANOTHER
     best_of: tuple[float, float] | None = None
+    is_compared: bool = False
 
     @property
     def verdict(self) -> str:
@@ -163,7 +168,8 @@ class Decision(NamedTuple):
         if self.best_of is None or not cause.needs_other_times:
             return cause.cure
         low, high = self.best_of
-        advice = _AVOID_BEST if self.grade == POOR else _USE_BEST
+        usable = _USE_COMPARED if self.is_compared else _USE_BEST
+        advice = _AVOID_BEST if self.grade == POOR else usable
         return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
 
 

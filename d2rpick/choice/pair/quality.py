@@ -58,6 +58,8 @@ _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
+# Smallest number of states up to td at which another cure than more states is named.
+_FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
@@ -400,6 +402,13 @@ def _describe_unknown_direction(situation: Situation) -> Cause:
     why = f": {refusal}" if refusal else ""
     unknown = "it is unknown whether the parts are deformed in the same direction at tr and td"
     cures = [*_ask_for_more_states(situation)]
+    if cures and _count_states(situation) < _FEW_STATES:
+        few = f"only {_count_states(situation)} states lie in the flight up to td"
+        return Cause(
+            f"{unknown}, because {few}",
+            cures[0].partition(", because")[0],
+            kind=unknown,
+        )
     for_modes = _describe_cure_for_modes(situation)
     if not cures or for_modes != _MORE_OFTEN:
         cures.append(for_modes)
@@ -427,11 +436,21 @@ def omit_comparison(quality: Quality) -> Quality:
     )
 
 
+def _get_begin(situation: Situation) -> float:
+    """Return the start of the flight, or of the record if the start is unknown [time]."""
+    start = situation.flight.start
+    return float(situation.history.time[0]) if start is None else start
+
+
+def _count_states(situation: Situation) -> int:
+    """Return the number of states in the flight up to td."""
+    return int(situation.history.between(_get_begin(situation), situation.td)[0].size)
+
+
 def _ask_for_more_states(situation: Situation) -> Iterator[str]:
     """Yield a request for a shorter output interval if too few states lie in the flight up to td."""
-    start = situation.flight.start
-    begin = float(situation.history.time[0]) if start is None else start
-    states = situation.history.between(begin, situation.td)[0].size
+    begin = _get_begin(situation)
+    states = _count_states(situation)
     if states < _ENOUGH_STATES and situation.td > begin:
         interval = (situation.td - begin) / _ENOUGH_STATES
         yield (

@@ -536,7 +536,13 @@ def list_objections(
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     limits = np.array([situation.most_error for situation in situations])[situation_of]
     too_much = judged & (error > limits)
-    yield Objection(too_much & ~modal, partial(_tell_error, error, limits))
+    for name, of_this_name in (
+        ("frozen-deformation error", compared),
+        ("level error", ~compared),
+    ):
+        yield Objection(
+            too_much & ~modal & of_this_name, partial(_tell_error, name, error, limits)
+        )
     yield Objection(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
@@ -605,11 +611,13 @@ def _tell_always(reason: str, _: int) -> list[str]:
     return [reason]
 
 
-def _tell_error(error: Samples, limits: Samples, candidate: int) -> list[str]:
+def _tell_error(
+    name: str, error: Samples, limits: Samples, candidate: int
+) -> list[str]:
     """Return the objection that the error of a candidate exceeds the tolerance."""
     limit = limits[candidate]
     return [
-        f"error {format_beyond_limit(error[candidate], limit)} above the tolerance {limit:g}"
+        f"{name} {format_beyond_limit(error[candidate], limit)}, above the tolerance {limit:g}"
     ]
 
 

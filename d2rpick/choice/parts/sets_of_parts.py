@@ -17,6 +17,7 @@ from d2rpick.base.errors import (
 )
 from d2rpick.choice.answers import suggest_in_run, verify_run
 from d2rpick.choice.pair.candidates import ONE_BODY
+from d2rpick.choice.pair.grades import POOR
 from d2rpick.choice.pair.warnings import warn_about_place
 from d2rpick.choice.parts.deck_of_run import (
     add_surroundings,
@@ -101,6 +102,11 @@ class PartSet(NamedTuple):
     def saving(self) -> float | None:
         """Fraction of the run time that is saved [-]; None if it is unknown."""
         return None if self.run_time_share is None else 1 - self.run_time_share
+
+    @property
+    def is_usable(self) -> bool:
+        """True if the pair of the set is not poor."""
+        return self.decision is None or self.decision.grade != POOR
 
     @property
     def out_of_place(self) -> bool:
@@ -437,14 +443,15 @@ def _add_position_error(part_set: PartSet, situation: Situation, tr: float) -> P
 def _mark_recommended(sets: Sequence[PartSet]) -> Iterator[PartSet]:
     """Mark the recommended set: the one with the largest saving or, among equal savings, with the fewest parts.
 
-    A set with too large a position error is considered only if all sets have one.
+    A set with a poor pair, or with too large a position error, is considered only if all sets have one.
     """
     useful = [
         part_set
         for part_set in sets
         if part_set.saving is not None and part_set.saving > 0
     ]
-    in_place = [part_set for part_set in useful if not part_set.out_of_place] or useful
+    usable = [part_set for part_set in useful if part_set.is_usable] or useful
+    in_place = [part_set for part_set in usable if not part_set.out_of_place] or usable
     largest = max((part_set.saving or 0.0 for part_set in in_place), default=0.0)
     alike = [
         part_set for part_set in in_place if (part_set.saving or 0.0) >= largest - _LIKE

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched.switched_run import FEWEST, SAME, choose_same_parts
+from d2rpick.choice.switched.frozen import FEWEST, SAME
+from d2rpick.choice.switched.switched_run import choose_same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
+# Largest relative difference of the energies before the switch in two runs of the same model [-].
+_OF_ANOTHER_MODEL: Final = 0.2
+# Fraction of the record in which no run is switched yet, if the time of the switch is unknown [-].
+_EARLY: Final = 0.1
 # Largest relative deviation of the momentum after td at which the motions of both runs are treated as equal [-].
 MOST_MOMENTUM_ERROR = 0.05
 # Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
@@ -181,7 +186,10 @@ def compare_runs(
     rigid = _find_rigid_window(switched, tr, td, still)
     mean = float(energies_after.mean())
     mean_reference = float(reference_after.mean())
-    objections = [*_check_rigid_window(reference, switched, rigid, tr, td, still)]
+    objections = [
+        *check_same_model(reference, switched, min(rigid[0] if rigid else tr, tr)),
+        *_check_rigid_window(reference, switched, rigid, tr, td, still),
+    ]
     if is_reported:
         objections += _check_locked_in_energy(
             reference, tr, frozen, energy_td, tolerance
@@ -320,6 +328,23 @@ def _check_rigid_window(
         yield f"{rigid_text}, not from tr {tr:g} to td {td:g}"
 
 
+def check_same_model(
+    reference: History, switched: History, end: float
+) -> Iterator[str]:
+    """Yield an objection if the energies of two runs differ before ``end``, where both are deformable [time]."""
+    start = max(reference.start, switched.start)
+    time, energy = reference.between(start, min(end, switched.end))
+    largest = float(np.abs(energy).max(initial=0.0))
+    if time.size < FEWEST or largest <= round_off(reference):
+        return
+    difference = float(np.abs(switched.energies_at(time) - energy).max()) / largest
+    if difference > _OF_ANOTHER_MODEL:
+        yield (
+            f"the energies of the two runs differ by {difference:.0%} before {end:.6g}, when both are deformable, so "
+            "they seem to be runs of different models"
+        )
+
+
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
@@ -385,6 +410,8 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
             moving.append((first, last))
     if not moving:
         reason = _explain_why_no_times(switched, reference, spans)
+        early = reference.start + _EARLY * reference.duration
+        reason = "; ".join((*check_same_model(reference, switched, early), reason))
         cure = (
             switched.left_beside
             or "; give the run with the switching cards, or `tr` and `td`"

@@ -20,6 +20,7 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.switched.frozen import FEWEST, SAME, find_frozen_times
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import find_complete_stretches
 from d2rpick.histories.history import Given, History
@@ -41,10 +42,6 @@ Times = tuple[float, float]
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
 _HARDLY: Final = 0.1
-# Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
-FEWEST: Final = 12
-# An internal energy whose relative change is below this is constant [-]; solvers write energies in single precision.
-SAME: Final = 1e-6
 # A flight that seems to begin at most this many output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
@@ -151,7 +148,7 @@ def prepare_switched_history(
         cautions += _warn_about_deforming(reference, tr, td)
     absent = _find_absent_windows(reference)
     new = []
-    for absent_window in absent:
+    for absent_window in absent or _find_frozen_windows(history):
         start, end = absent_window.start, absent_window.end
         if not any(tr < end and start < td for tr, td in done):
             new.append(absent_window)
@@ -341,6 +338,12 @@ def _find_absent_windows(reference: Reference) -> tuple[_AbsentWindow, ...]:
         deform = ~rigid & (np.ptp(energies[states], axis=0) > rounding)
         windows.append(_AbsentWindow(start, end, list_names(names), not deform.any()))
     return tuple(windows)
+
+
+def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
+    """Yield the windows in which the energy shows that the chosen parts were rigid."""
+    for start, end in find_frozen_times(history):
+        yield _AbsentWindow(start, end, "the chosen parts", whole=True)
 
 
 def _select_deformable(

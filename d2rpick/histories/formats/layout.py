@@ -164,14 +164,17 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
     rows = [(number, line) for number, line in numbered if line.lstrip()[0].isdigit()]
     number, line = next(iter(rows or numbered), (1, ""))
     below = "below" if text.is_short else f"in the first {HEAD} lines"
-    problem = f"{text.name}:{number}: {quote_start(line)} was found, and no rows of at least two numbers {below}"
+    found = f"{text.name}:{number}: {quote_start(line)} was found"
+    problem = f"{found}, and no rows of at least two numbers {below}"
     cure = "check that this is the right file, or name its separator in a first line, as sep=:"
     if rows and has_number(line.strip(), ".", ""):
-        cure = "this file has one column; add the times"
-    elif _LISTING_OF_LS_DYNA in line:
-        cure = (
-            "this is a listing of LS-DYNA; give the glstat, matsum or binout of the run"
+        problem = (
+            f"{text.name}:{number}: only one column, {quote_start(line)}, was found"
         )
+        cure = "add a column with the times"
+    elif _LISTING_OF_LS_DYNA in line:
+        problem = f"{text.name}:{number}: this is a listing of LS-DYNA"
+        cure = "give the glstat, matsum or binout of the run"
     return FormatError(f"{problem}; a table of time and energy was expected; {cure}")
 
 

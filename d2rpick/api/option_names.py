@@ -1,0 +1,57 @@
+"""Name the options of the command line in messages that name the arguments of Python."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from d2rpick.api.cards import Cards
+from d2rpick.api.request import OPTIONS
+from d2rpick.base.options import list_options, make_option_name
+
+# Arguments that messages name in backticks.
+ARGUMENTS: Final = (
+    *OPTIONS,
+    *list_options(Cards),
+    *(
+        "td",
+        "td_window",
+        "tr",
+        "min_rigid",
+        "overwrite",
+        "write_as",
+        "done",
+        "before",
+        "wait",
+        "min_mean_energy",
+    ),
+)
+# Options whose names differ from these arguments.
+_OTHERS: Final = {
+    "parts": "part",
+    "channels": "channel",
+    "replay": "no_verify",
+    "run": "history",
+}
+
+
+def replace_arguments(message: str) -> str:
+    """Replace the argument names in a message with the options that set them.
+
+    Examples
+    --------
+    >>> replace_arguments("give it as `after` where it is known")
+    'give it as --after where it is known'
+    """
+    has_names = "`" in message
+    if has_names:
+        return re.sub(
+            r"`(\w+)`", lambda match: find_option(match[1]) or match[0], message
+        )
+    return message
+
+
+def find_option(argument: str) -> str:
+    """Return the option that sets an argument; empty if there is no such option."""
+    name = _OTHERS.get(argument, argument)
+    return f"--{make_option_name(name)}" if name in ARGUMENTS else ""

@@ -1,0 +1,97 @@
+"""Name the command that follows an answer, with the options and the files of its question, so that it can be typed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.report.tables import make_positional, quote_shell_line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.situation import Situation
+    from d2rpick.choice.question import Settings
+    from d2rpick.histories.history import History
+    from d2rpick.report.formats import RepeatedQuestion
+
+# Ids in a command if the user has to name the parts or the nodes, because no file contains them.
+_SOME_PART: Final = "1"
+_SOME_NODE: Final = "1001"
+
+
+def write_command(
+    question: RepeatedQuestion, name: str, *words: str, new_parts: Sequence[str] = ()
+) -> str:
+    """Return another command about the same run, with the given parts unless ``new_parts`` replace them."""
+    parts = ("--part", ",".join(new_parts)) if new_parts else question.parts
+    files = make_positional(question.files)
+    return quote_shell_line(
+        ("d2rpick", name, *words, *parts, *question.options, *files)
+    )
+
+
+def name_step_to_card(
+    history: History,
+    settings: Settings,
+    windows: Sequence[tuple[float, float]],
+    question: RepeatedQuestion,
+    command: str,
+    *,
+    flying: bool,
+) -> str:
+    """Return the step that prints the card of windows, with ``command`` (``suggest`` or ``plan``) or with ``card``.
+
+    If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
+    """
+    from d2rpick.deck.printing import SOLVERS, find_solver
+
+    is_radioss = SOLVERS[find_solver(history.format)].switches == "node"
+    is_chosen = question.parts or "--energy" in question.options
+    if flying and not is_chosen and not is_radioss:
+        again = "verify" if command == "card" else command
+        line = write_command(question, again, *question.times, new_parts=["flying"])
+        return f"choose the parts to switch, for example those that fly, with {line}"
+    # Only `card` accepts parts that the history does not contain.
+    if command != "card" and (history.parts or is_radioss):
+        words = (*question.times, "-f", "card")
+    else:
+        words = tuple(
+            text
+            for tr, td in windows
+            for text in ("--tr", f"{tr:.6g}", "--td", f"{td:.6g}")
+        )
+        command = "card"
+    hint = ""
+    # The deck names the main nodes of the rigid bodies that contain the parts.
+    if is_radioss and not (history.parts and settings.bodies is not None):
+        words = (*words, "--node", _SOME_NODE)
+        hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
+    elif not history.parts:
+        words = (*words, "--part", _SOME_PART)
+        hint = f" (ids of your parts instead of {_SOME_PART})"
+    if command == "card":
+        line = quote_shell_line(("d2rpick", "card", *words, *question.judging))
+    else:
+        line = write_command(question, command, *words)
+    return f"print the cards with {line}{hint}"
+
+
+def name_step_after_refusal(
+    situation: Situation,
+    better: Pair | None,
+    question: RepeatedQuestion,
+    otherwise: str,
+) -> str:
+    """Return the step after a pair that cannot be used: to a better pair, to more parts, or ``otherwise``."""
+    if better is not None:
+        line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
+        return f"judge the better pair with {line}"
+    missing = situation.together.not_chosen.parts if question.parts else ()
+    if missing:
+        parts = (*(situation.history.parts or ()), *missing)
+        line = write_command(
+            question, "suggest", new_parts=[str(part.id) for part in parts]
+        )
+        return f"judge the parts that vibrate together with {line}"
+    return otherwise
