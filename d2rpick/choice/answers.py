@@ -367,7 +367,7 @@ class PairSuggestion(AnswerAtTd):
 
 
 def _has_smaller_residual(pair: Pair, candidate: Candidate) -> bool:
-    """Return True if the residual of a pair is smaller than that of a candidate, beyond its uncertainty."""
+    """Return True if the residual of a pair is smaller than that of a candidate by more than its uncertainty."""
     if pair.residual is None or candidate.residual is None:
         return False
     bound = candidate.residual_high
@@ -389,7 +389,7 @@ def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
 def compare_in_flight(
     decision: Decision, situation: Situation, candidate: Candidate
 ) -> Decision:
-    """Add to the decision on a pair a clearly better pair of the same flight, or else the range of td without one.
+    """Add to the decision on a pair a clearly better pair of the same flight, or the td range in which there is none.
 
     The flight is searched only if another time may be better, and no better pair is known yet.
     """
@@ -411,7 +411,7 @@ def compare_in_flight(
 
 
 def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
-    """Return the pair that is chosen in the flight of a situation; None if its flight is unknown."""
+    """Return the suggestion for the flight of a situation; None if the flight is unknown or allows no choice."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.td.flights import find_longest_flight
 
@@ -429,7 +429,7 @@ def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
 def _choose_in_window(
     history: History, settings: Settings, window: tuple[float, float]
 ) -> PairSuggestion | None:
-    """Return the pair that is chosen in a window for td; None if the record does not allow a choice."""
+    """Return the suggestion for a td in a window; None if the record does not allow a choice."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.td.suggest_td import choose_td
 
@@ -645,7 +645,7 @@ def _refuse_switched(situation: Situation) -> None:
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
-    """Add to the answer for a given td what the search of its flight finds if the pair is not good."""
+    """If the pair for a given td is not good, add the result of searching its flight to the answer."""
     best, decision = answer.chosen, answer.decision
     if best is None or decision is None or decision.better:
         return answer

@@ -137,7 +137,7 @@ class Overview(NamedTuple):
 
     @property
     def _is_spent(self) -> bool:
-        """True if parts were rigid, and no flight begins after that."""
+        """True if parts were rigid and no flight begins afterwards."""
         last = max((end for _, end in self.rigid), default=None)
         return last is not None and all(
             flight.start < last for _, flight in self.flights
@@ -373,7 +373,7 @@ def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
 
 
 def _list_times(windows: Sequence[Times]) -> str:
-    """Return windows of time as text."""
+    """Return time windows as text."""
     return list_names([f"{start:.6g} to {end:.6g}" for start, end in windows])
 
 

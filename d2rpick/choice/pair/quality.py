@@ -58,7 +58,7 @@ _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# Smallest number of states up to td at which another cure than more states is named.
+# With at least this many states up to td, a cure is proposed other than more states.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5

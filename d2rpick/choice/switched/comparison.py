@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest relative difference of the energies before the switch in two runs of the same model [-].
+# Largest relative difference between the energies of two runs of the same model before the switch [-].
 _OF_ANOTHER_MODEL: Final = 0.2
-# Fraction of the record in which no run is switched yet, if the time of the switch is unknown [-].
+# Fraction of the record in which runs are assumed to be deformable if the time of the switch is unknown [-].
 _EARLY: Final = 0.1
 # Largest relative deviation of the momentum after td at which the motions of both runs are treated as equal [-].
 MOST_MOMENTUM_ERROR = 0.05
@@ -331,7 +331,7 @@ def _check_rigid_window(
 def check_same_model(
     reference: History, switched: History, end: float
 ) -> Iterator[str]:
-    """Yield an objection if the energies of two runs differ before ``end``, where both are deformable [time]."""
+    """Yield an objection if the energies of two runs differ before ``end`` [time], while both are deformable."""
     start = max(reference.start, switched.start)
     time, energy = reference.between(start, min(end, switched.end))
     largest = float(np.abs(energy).max(initial=0.0))
