@@ -60,7 +60,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     if not causes:
         return ""
     reasons = "; ".join(cause.reason for cause in causes)
-    # A better pair is the cure that the verdict names.
+    # A better pair is a cure that the verdict already names.
     curable = [
         cause
         for cause in causes

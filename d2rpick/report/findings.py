@@ -119,7 +119,7 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _name_next_step(checks: Checks) -> str:
-    """Return what to do after the check, with a command that can be typed."""
+    """Return what to do after the check, with a command that can be copied."""
     serious = [
         finding
         for result in checks.results

@@ -42,7 +42,7 @@ class WrittenDeck(NamedTuple):
 
 
 class RepeatedQuestion(NamedTuple):
-    """Words of the command line with which another command asks about the same run.
+    """Parts of the command line with which another command asks about the same run.
 
     Parameters
     ----------

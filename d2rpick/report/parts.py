@@ -403,7 +403,7 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
-    """Return the next command: to the plan with the recommended set, or to all td if its pair cannot be used."""
+    """Return the next command: ``plan`` with the recommended set, or ``explore`` if the pair of the set is unusable."""
     best = answer.recommended
     if best is None:
         parts: Sequence[str] = ()

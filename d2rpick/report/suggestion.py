@@ -40,14 +40,14 @@ _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
-# A pair with the decision on it.
+# Fields of a pair and of the decision on it.
 _JUDGED_PAIR: Final = row(
     *keys.PAIR.fields,
     Field("verdict", keys.VERDICT),
     Field("verdict_reason", "text"),
     later=("verdict", "verdict_reason"),
 )
-# A candidate and the decision on it.
+# Fields of a candidate and of the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
     keys.NO_PARTS,
@@ -227,7 +227,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairSuggestion, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of a pair that can be used, otherwise to a better pair."""
+    """Return the next command, which leads to the card of a usable pair or else to a better pair."""
     decision = answer.decision
     situation = answer.situation
     pair = answer.recommended

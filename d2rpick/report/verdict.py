@@ -109,7 +109,7 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairVerdict, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of a pair that can be used, a page on its switched run, or a better pair."""
+    """Return the next command: it leads to the card of a usable pair, a page on its switched run, or a better pair."""
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
