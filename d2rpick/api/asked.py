@@ -67,7 +67,7 @@ class RunQuestion(NamedTuple):
 
     @property
     def repeated(self) -> RepeatedQuestion:
-        """Words of the command line with which other commands ask about the same run."""
+        """Parts of the command line with which other commands ask about the same run."""
         if self.unused_deck:
             question = self.request.repeat(without=("deck", "weights", "step_ratio"))
             return question._replace(

@@ -270,7 +270,7 @@ class Request(ChoiceOptions, ReadingOptions):
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
-        """Return the words of the command line with which other commands ask about the same run."""
+        """Return the parts of the command line with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
         left_out = {"part", *without}
