@@ -102,7 +102,7 @@ class Documented(click.Command):
         formatter.write("\n" + "\n".join(lines) + "\n")
 
 
-# An option is not suggested if its likeness to a mistyped one is smaller than that of the best by more than this [-].
+# Only options that resemble a mistyped one almost as well as the best match are suggested, to within this limit [-].
 _LESS_ALIKE: Final = 0.1
 
 
@@ -196,7 +196,7 @@ class _CommandGroup(Documented, click.Group):
 
 
 def _format_usage_error(error: click.UsageError) -> str:
-    """Return the message of a usage error; an unknown option is compared with the options that resemble it most."""
+    """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
     if not isinstance(error, click.NoSuchOption) or not error.possibilities:
         return error.format_message()
     import difflib

@@ -431,7 +431,7 @@ def repeat_command() -> list[str]:
 
 
 def write_times(**values: Any) -> tuple[str, ...]:
-    """Return options as typed; those without a value are left out.
+    """Return options as typed; options without a value are omitted.
 
     Examples
     --------
