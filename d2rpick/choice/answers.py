@@ -524,7 +524,7 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _drop_poor(pair: Pair | None) -> Pair | None:
-    """Return a pair if its residual shows that it is not poor; otherwise None."""
+    """Return a pair if its residual is known and not poor; otherwise None."""
     if pair is None or pair.residual is None or pair.residual > POOR_RESIDUAL:
         return None
     return pair

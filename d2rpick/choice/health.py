@@ -37,7 +37,7 @@ MOST_IMBALANCE = 0.10
 # MOST_NEGATIVE_SLIDING: largest absolute value of a negative contact energy, relative to the peak internal energy [-].
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# Largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
+# Largest internal energy that is treated as 0 [energy]; LS-DYNA energies start at 2e-20 per process.
 _FLOOR: Final = 1e-15
 # Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01

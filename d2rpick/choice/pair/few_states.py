@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.situation import Situation
 
-# Number of extrema of the energy in each of its periods: a minimum and a maximum.
+# Number of energy extrema in each energy period: a minimum and a maximum.
 _TURNS_PER_PERIOD: Final = 2
 # LS-DYNA usually writes these files at shorter intervals than d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     # A function that tests times and returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Largest number of halvings of a sampling interval, with which the end of a window is found to 1e-6 of the interval.
+# Largest number of halvings of a sampling interval; they locate the end of a window to 1e-6 of the interval.
 _HALVINGS: Final = 20
-# Relative margin by which a level lies below the highest energy, so that rounding does not hide the crossing [-].
+# A level lies below the highest energy by this fraction, so that rounding does not hide the crossing [-].
 _BELOW: Final = 1e-12
 
 # Largest deviation of the error from its polyline [-], which is half a unit of the last printed digit.
