@@ -551,7 +551,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of a refusal is omitted.
+    # The oscillator is fitted again, but the slow search for the reason of a refusal is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 

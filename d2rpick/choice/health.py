@@ -293,7 +293,7 @@ def _find_ratio_range(balance: Balance) -> dict[str, Any]:
 
 
 def _compute_total(balance: Balance) -> Samples | None:
-    """Return the total energy written by the solver, or else the sum of all energies; None if a main one is unknown."""
+    """Return the total energy written by the solver, or else the sum of all energies; None if one is missing."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:

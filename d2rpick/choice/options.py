@@ -84,7 +84,7 @@ class Use(NamedTuple):
 
 
 def _describe_use(**use: Any) -> dict[str, Use]:
-    """Return the metadata of a dataclass field that describe how an option is used."""
+    """Return dataclass-field metadata that describe how an option is used."""
     return {"use": Use(**use)}
 
 

@@ -165,7 +165,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates, group by group; in each group, the equally good best candidates come first.
+    """Return the order of the candidates, group by group; each group starts with the best, equally good candidates.
 
     These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
     (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
@@ -318,7 +318,7 @@ class Quality(NamedTuple):
 
     @property
     def grade(self) -> str:
-        """The worse of the grades of the motion and of the vibration."""
+        """The worse of two grades: that of the motion and that of the vibration."""
         return min((self.motion.grade, self.vibration.grade), key=GRADES.index)
 
     @property
@@ -570,7 +570,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def count_states_per_period(energy: Samples) -> float | None:
-    """Return the average number of states per energy period (two crossings of the mean); None if there is no period.
+    """Return the average number of states per energy period; None if the energy does not complete a period.
 
     Examples
     --------

@@ -174,7 +174,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning with the earliest contact time, if the body only grazes in the contact that ends the flight."""
+    """Yield a warning with the earliest contact time if the body only grazes in the contact that ends the flight."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.source != "grazing":
@@ -215,7 +215,7 @@ def _describe_early_contact(situation: Situation) -> str:
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning, with advice, if a flight is uncertain although other data than the part energies show it."""
+    """Yield a warning with advice if a flight is uncertain although data other than the part energies show it."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
@@ -394,7 +394,7 @@ class Means(NamedTuple):
 
 
 def compute_means(situation: Situation) -> Means | None:
-    """Compute the energies of the flight; None if the basis is not "energy", or nothing flies or vibrates."""
+    """Compute the energies of the flight; None if the basis is not "energy", or if nothing flies or vibrates."""
     if situation.basis != "energy":
         return None
     mean = compute_mean_in_flight(situation)

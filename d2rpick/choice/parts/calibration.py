@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Assumed relative error of CPU times (5 %), divided by that of the assumed weight ratios (50 %) [-].
+# Ratio of the assumed relative error of CPU times (5 %) to that of the assumed weight ratios (50 %) [-].
 _DOUBT: Final = 0.1
 # Restart segments determine a weight if they contribute at least this fraction of its value [-].
 _TOLD: Final = 0.5

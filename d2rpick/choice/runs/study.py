@@ -338,7 +338,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs, and the interval within the accuracy of every tr (empty if low > high)."""
+    """Return the tr of all runs, and the interval that lies within the accuracy of every tr (empty if low > high)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)

@@ -69,7 +69,7 @@ def find_longest_flight(
 
 
 def compute_last_td(end: float, margin: float) -> float:
-    """Return the last td whose distance from the end of a flight is at least ``margin``, even if printed [time]."""
+    """Return the last td that is at least ``margin`` before the end of a flight after rounding for print [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 

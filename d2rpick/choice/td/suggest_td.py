@@ -520,7 +520,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; infinity if empty."""
+    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; else infinity."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
@@ -557,7 +557,7 @@ def _choose_by_level(
 def _list_by_rigid_time(
     situation: Situation, times: Iterable[float]
 ) -> Iterator[Choice]:
-    """Yield acceptable choices by descending bound of the rigid time, while a longer rigid time is possible."""
+    """Yield acceptable choices in descending order of the bound on their rigid time, until none can be longer."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     bounds = bound_rigid_times(situation, tds)
