@@ -68,7 +68,7 @@ class PageSection(Markup):
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Return an element. In attribute names, ``_`` stands for ``-``; a final underscore avoids a Python keyword.
+    """Return an element. In attribute names, ``_`` stands for ``-``; a final underscore avoids Python keywords.
 
     Examples
     --------

@@ -55,7 +55,7 @@ COLUMNS: Final = [
 ]
 
 
-# Smallest change of the rigid time that is mentioned, relative to the rigid time [-].
+# Smallest relative change of the rigid time that is mentioned [-].
 _NO_CHANGE: Final = 5e-4
 # Range of error ratios that are described as halving the error [-]; other ratios are given as numbers.
 _HALF: Final = (0.45, 0.5)
