@@ -210,7 +210,7 @@ class RunAnswer(Paged):
         return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
-        """Return the interactive data of a page, and the command line that gives the answer for a td."""
+        """Return the interactive data of a page, and the command line that repeats the answer for any td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)

@@ -299,7 +299,7 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, and the verdict on each new window with its times as printed; ``str`` returns the text of the card.
+    """A card, and a verdict on each of its new windows for the printed times; ``str`` returns the text of the card.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
     ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
