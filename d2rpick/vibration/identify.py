@@ -164,7 +164,7 @@ def identify(
     )
     if (
         quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # All other fits leave a larger misfit than the largest model.
+    ):  # No other model leaves a smaller misfit than the largest model.
         return _is_out_of_reach(time)
     fits = (
         (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
@@ -349,7 +349,7 @@ def _judge_attempt(
     e = record.e
     density = count_samples_per_period(
         s, attempt.scaled
-    )  # This number is computed first, because it needs as much memory as all later steps.
+    )  # This number is computed first, because its computation needs as much memory as all later steps.
     remainder = e - attempt.energy
     rms = float(np.sqrt(np.mean(remainder**2)))
     spread = float(np.std(e))

@@ -77,7 +77,7 @@ class LineScatter:
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
     def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
-        """Return the waves, weighted such that they give the means over the blocks of the grid."""
+        """Return the waves with the weights that give their means over the blocks of the grid."""
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:

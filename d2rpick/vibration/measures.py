@@ -363,6 +363,6 @@ class Profile(NamedTuple):
         t0, e0 = self.time[inside], self.error[inside]
         t1, e1 = self.time[outside], self.error[outside]
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # If there is no sample between tr and the first sample outside, the sample outside is used.
+        # If there is no sample between tr and the first sample outside, this first sample is used.
         leaving_time = np.where(e0 > limit, t1, t0 + share * (t1 - t0))
         return np.asarray(np.abs(leaving_time - tr))

@@ -639,7 +639,7 @@ def _choose_interpretation(
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
 
-    # If these lines were modes and explained all of the mean energy, no energy would be static.
+    # The lines of static deformations, taken as modes, may explain all of the mean energy; then no energy is static.
     half_of_all = plain.level_of_modes(time) / 2
     excess = abs(float(np.mean(spectrum.mean.at(time) - half_of_all)))
     explains_mean = excess < _AMBIGUOUS * float(np.mean(half_of_all))

@@ -151,7 +151,7 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Return the number of states up to the last state before the window that deviates from the modes."""
+    """Return the index after the last state that deviates from the modes; all of the states precede the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(

@@ -294,7 +294,7 @@ def find_moments(
 def measure_all(
     vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
 ) -> tuple[Samples, Columns]:
-    """Return the energy of each tr (n,), and its measures if its deformation is comparable with that at its td.
+    """Return the energy of each tr (n,), and its measures if its deformation can be compared with that at its td.
 
     The times of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """

@@ -150,7 +150,7 @@ class OscillatorEnergy(SampledEnergy):
         return f"{finding}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
-        """Return the energy E at the given times, in their shape [energy]."""
+        """Return the energies at the given times, in the shape of the times [energy]."""
         return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:

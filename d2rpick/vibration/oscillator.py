@@ -281,7 +281,7 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Return the energy mode of ``oscillator`` that starts at rest except for the frame velocity ``v0``.
+    """Return the vibration mode of an ``oscillator`` whose frame has the velocity ``v0`` at time 0 and all else rests.
 
     Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
     squared.

@@ -249,7 +249,7 @@ def _fit_states(
 
 @remember
 def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex128]:
-    """Return the complex exponents in the energies between two states; quick and full fits share them."""
+    """Return the complex exponents found in the energies between two states; quick and full fits share the result."""
     return find_rates(*history.between(*(ends or _NO_STATE)))
 
 
@@ -489,7 +489,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
 def measure_deviations(
     time: Samples, energy: Samples, fit: Identification
 ) -> tuple[Samples, Samples]:
-    """Return times [time], and by how much the energy near each time deviates from the fit in excess of noise.
+    """Return times [time], and by how much the energy near each time deviates from the fit beyond noise.
 
     A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
     deviation is the largest mean over a quarter of a period of the energy, within one such period.

@@ -258,7 +258,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
-    """Return values on straight lines through points, extrapolated from the first two and the last two points."""
+    """Return values on the straight lines between points, extrapolated at both ends from the two nearest points."""
     first_slope = (y[1] - y[0]) / (x[1] - x[0])
     last_slope = (y[-2] - y[-1]) / (x[-2] - x[-1])
     first = y[0] + first_slope * (time[0] - x[0])
