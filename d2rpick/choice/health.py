@@ -293,7 +293,7 @@ def _find_ratio_range(balance: Balance) -> dict[str, Any]:
 
 
 def _compute_total(balance: Balance) -> Samples | None:
-    """Return the total energy written by the solver, or else the sum of all energies; None if one is missing."""
+    """Return the total energy from the solver, or the sum of all energies; None without internal or kinetic energy."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
