@@ -39,7 +39,7 @@ _AT_REST = 0.01
 # The reported energy can differ, because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
 # _STILL: largest change of an energy that is treated as constant, relative to the energy [-].
-# _STILL_OF_VIBRATION: largest change of a constant energy, relative to the vibration energy [-].
+# _STILL_OF_VIBRATION: largest change of an energy treated as constant, relative to the vibration energy [-].
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
