@@ -186,7 +186,7 @@ def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
 
 
 def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return, each with a name, what to do with the recommended pair, why, and what to expect after td."""
+    """Return (name, sentence) pairs: what to do with the recommended pair, why, and what to expect after td."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better
