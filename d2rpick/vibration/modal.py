@@ -681,7 +681,7 @@ def _read_first_part(
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
-    """Return the error of R^2 if the difference of two deformations has a relative error of ``off`` [-]."""
+    """Return the error of R^2 due to the relative error ``off`` of the difference of two deformations [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 

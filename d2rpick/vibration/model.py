@@ -375,13 +375,13 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the number of states per period of the highest-frequency line [-]; None without any lines."""
+        """Return the number of states per period of the highest-frequency line [-]; None if no line is known."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def states_per_strong_period(self) -> float | None:
-        """Return the number of states per period of the highest-frequency strong line [-]; None without any lines."""
+        """Return the number of states per period of the highest-frequency strong line [-]; None if no line is known."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 

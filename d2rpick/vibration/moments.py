@@ -163,7 +163,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @property
     def before(self) -> float:
-        """Return a time just before the span, which makes the span's first sample equal to all others [time]."""
+        """Return a time [time] just before the span, so that the span's first sample is treated like all others."""
         return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
