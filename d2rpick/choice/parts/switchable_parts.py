@@ -143,7 +143,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together, or of all deformable parts, and the flying parts."""
+    """Return the energy of the parts that fly together, or else of all deformable parts; also the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -327,7 +327,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with verdict and reasons; only the part ``alone`` absorbs energy at the landing."""
+    """Return the row of a part with its verdict and reasons; only the part ``alone`` absorbs the landing energy."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(
