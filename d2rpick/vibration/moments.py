@@ -194,7 +194,7 @@ class OscillatorEnergy(SampledEnergy):
         return times[self.within(times)]
 
     def edges(self) -> Samples:
-        """Return the extrema of the energy and the ends of the span; the energy is monotone between them [time]."""
+        """Return the times of the energy extrema and span ends, between which the energy is monotone [time]."""
         return np.concatenate(
             [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
         )
