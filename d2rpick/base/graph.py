@@ -1,4 +1,4 @@
-"""Search a graph for all nodes that are reachable from given nodes."""
+"""Search a graph for all nodes that are reachable from the given nodes."""
 
 from __future__ import annotations
 

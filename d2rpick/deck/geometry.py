@@ -289,7 +289,7 @@ class Placement:
         }
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
-        """Return the mean position (3,) of the watched nodes of given parts [length]; each node counts once.
+        """Return the mean position (3,) of the watched nodes of the given parts [length]; each node counts once.
 
         The result is None if no node is watched.
         """
@@ -301,7 +301,7 @@ class Placement:
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
     def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
-        """Return the positions (3,) of the watched nodes of given parts [length], keyed by node number."""
+        """Return the positions (3,) of the watched nodes of the given parts [length], keyed by node number."""
         inventory = self._inventory
         numbers = dict(
             zip(inventory.watched.tolist(), inventory.watched_ids.tolist(), strict=True)

@@ -449,7 +449,7 @@ class Inventory:
         return self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()
 
     def rigid_nodes(self, parts: Iterable[int]) -> int:
-        """Return the number of nodes of given parts."""
+        """Return the number of nodes of the given parts."""
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
@@ -479,7 +479,7 @@ class Inventory:
         return counts_by_part
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
-        """Return a mask (nodes,) of the nodes of given parts."""
+        """Return a mask (nodes,) of the nodes of the given parts."""
         mask = np.zeros(len(self.coordinates), bool)
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True

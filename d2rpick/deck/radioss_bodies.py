@@ -60,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """The rigid bodies that switch given parts, and the cards of the bodies among them that are new.
+    """The rigid bodies that switch the given parts, and the cards of the bodies among them that are new.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -75,7 +75,7 @@ class SwitchedBodies(NamedTuple):
 
 
 def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
-    """Find the rigid bodies of given parts in a Radioss deck, and write the missing ones.
+    """Find the rigid bodies of the given parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
     is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first engine run has
@@ -176,7 +176,7 @@ def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[in
 
 
 def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
-    """Return the ids of all nodes of given parts."""
+    """Return the ids of all nodes of the given parts."""
     return frozenset(
         node
         for part in parts
@@ -294,7 +294,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return the main node of a new rigid body of given parts, and its cards with velocity and gravity."""
+        """Return the main node of a new rigid body of the given parts, and its cards with velocity and gravity."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")

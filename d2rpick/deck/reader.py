@@ -242,7 +242,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards, keyed by name and by each prefix of the name before a ``_``; rules look up both."""
+        """Return the cards, keyed by name and by each prefix of the name before a ``_``; rules use both as keys."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):

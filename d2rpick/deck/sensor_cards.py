@@ -37,7 +37,7 @@ def write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) ->
 
 
 def write_any_of(numbers: Sequence[int], title: str) -> tuple[str, int]:
-    """Return cards of sensors that combine given sensors by OR, and the id of the last one, which gives the result."""
+    """Return the cards of sensors that combine sensors by OR, and the id of the last one, which gives the result."""
     texts: list[str] = []
     last, *others = numbers
     for number, other in enumerate(others, start=numbers[-1] + 1):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
-# For each CODE: what exerts the force, and True if the set waits for the force to begin, False if for it to end.
+# For each CODE: what exerts the force, and True if the set waits for the force to begin, False if to end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),

@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column besides the times, or the only column whose name means an internal energy."""
+    """Return the only numeric column besides the times, or the only column whose name denotes an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name means internal energy, or the only column besides the time; else raise FormatError."""
+        """The column whose name denotes internal energy, or else the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )

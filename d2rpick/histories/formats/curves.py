@@ -87,7 +87,7 @@ class _CurveText:
         )
 
     def lines(self) -> Iterator[tuple[int, str]]:
-        """Yield number and text of all lines that are neither blank nor comments."""
+        """Yield the number and text of all lines that are neither blank nor comments."""
         for number, line in enumerate(self._text.lines(0), 1):
             self.last = number
             if _has_content(line):
@@ -166,7 +166,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only curve whose name means an internal energy; otherwise raise FormatError.
+        """The only curve, or the only curve whose name denotes an internal energy; otherwise raise FormatError.
 
         The error lists all curves.
         """

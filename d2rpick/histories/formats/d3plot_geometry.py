@@ -198,7 +198,7 @@ class Geometry:
 
 
 class Titles:
-    """The titles after the geometry; ``at`` is the offset after the titles, where the states may begin [byte]."""
+    """The titles after the geometry; ``at`` is the offset of the first byte after them, where the states may begin."""
 
     def __init__(self, words: Words, at: int) -> None:
         self._words, self.at = words, at

@@ -239,7 +239,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError, with its line, for the first of the values (states, len(names)) that is not a number."""
+        """Raise FormatError, with the line, for the first value (states, len(names)) that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return

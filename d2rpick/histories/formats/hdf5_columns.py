@@ -58,7 +58,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the name of the column means a time; the name in ``time/value`` is ``time``."""
+        """True if the name of the column denotes a time; the name in ``time/value`` is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]

@@ -57,7 +57,7 @@ _DAMAGED: Final = (
 # Offset of the end-of-file address in superblock versions 0 to 3. All writers use 8-byte addresses.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# Time-out of a read in addition to 1 s per 100 kB [s]. A longer read means a cyclic B-tree in a damaged file.
+# Time-out of a read in addition to 1 s per 100 kB [s]; a longer read indicates a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
 _SLOWEST: Final = 100_000  # Slowest expected reading speed [bytes/s].
 _USER_BLOCK: Final = 512  # Number of bytes that MATLAB writes before the HDF5 content.
@@ -120,7 +120,7 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column whose name means an internal energy, or else the only column besides the time.
+        """The only column whose name denotes an internal energy, or else the only column besides the time.
 
         Raise a FormatError that lists all columns if there is no such column.
         """
@@ -337,7 +337,7 @@ def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Col
 def _find_only_energy(
     columns: Sequence[Column], time: Column | None, source: str
 ) -> Column:
-    """Return the only column whose name means an internal energy, or the only column besides a time."""
+    """Return the only column whose name denotes an internal energy, or the only column besides a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:
