@@ -294,7 +294,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of a part of a body; it is rigid from the start unless the body is deactivated at time 0."""
+    """Return the windows of a part of a body, which is rigid from the start unless it is deactivated at time 0."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (

@@ -260,7 +260,7 @@ class Deck:
 
     @property
     def silencing(self) -> list[Card]:
-        """Return the cards that have a comment before them that silences rules."""
+        """Return the cards that are preceded by a comment that silences rules."""
         return [
             card
             for card in self._all

@@ -1,4 +1,4 @@
-"""Find what a card must suit in a deck: free ids, constraints on the parts, and the name and end of the run."""
+"""Find the requirements of a deck on a card: free ids, constraints on the parts, and the name and end of the run."""
 
 from __future__ import annotations
 

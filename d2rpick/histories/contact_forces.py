@@ -79,7 +79,7 @@ class ContactForce(NamedTuple):
 
     @property
     def tells(self) -> bool:
-        """True if the force acts at some times, but not at all times."""
+        """True if the force acts at some times and does not act at others."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 

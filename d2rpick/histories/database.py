@@ -390,7 +390,7 @@ def _join_columns(columns: Sequence[Samples]) -> Samples:
 
 
 def _list_times(database: Database | Legs) -> list[Samples]:
-    """Return the times of the whole model and of the parts, as far as the database has them."""
+    """Return those times of the whole model and of the parts that the database contains."""
     return [
         *([database.time] if database.channels else []),
         *([database.part_time] if database.parts else []),

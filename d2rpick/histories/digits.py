@@ -31,9 +31,9 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# A time converted to ms or us is plausible from this distance from the record start, as a fraction of the record [-].
+# A time converted to ms or us is plausible at least this far from the record start, as a fraction of the record [-].
 _NEVER_MEANT: Final = 0.01
-# A converted time is suggested from this distance from the record start, as a fraction of the record [-].
+# A converted time is suggested at least this far from the record start, as a fraction of the record [-].
 _HARDLY_MEANT: Final = 0.05
 # A td within this many first states is assumed to be in another unit, because such an early td would hardly save time.
 # Only a record of 1000 or more states can contain both a td and 1000 times this td.

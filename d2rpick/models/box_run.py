@@ -261,7 +261,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # Overflow warnings are suppressed; an overflow shows as too many time steps, which are rejected below.
+    # Overflow warnings are suppressed; an overflow appears as too many time steps, which are rejected below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:

@@ -34,7 +34,7 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-# Values of TIME2 from this one on mean that there is no latest switching time.
+# If TIME2 is at least this, there is no latest switching time.
 _NEVER: Final = 1e20
 # Longest window that is treated as chatter instead of a flight, as a fraction of the longest window [-].
 _SHORT: Final = 0.1

@@ -378,7 +378,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield the flaws of the run that have the given code."""
+    """Yield those flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message

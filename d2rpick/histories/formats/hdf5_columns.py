@@ -31,7 +31,7 @@ _PICKLED_INDEX_NAME: Final = re.compile(
 # First characters of the names of groups without histories, such as PyTables index trees and MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-# Largest number of columns at which a table without column names is read.
+# Tables without column names are read if they have at most this number of columns.
 _WIDEST: Final = 64
 
 # Largest dataset that is copied, as a fraction of the file size [-]; a view would keep the whole file in memory.
