@@ -302,7 +302,7 @@ class OpenedRun:
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return the kinetic energies of the given parts, shape (n, parts) [energy]; a missing one raises FormatError."""
+        """Return the kinetic energies of the given parts, shape (n, parts) [energy], or raise FormatError."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:

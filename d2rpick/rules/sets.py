@@ -210,7 +210,7 @@ def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
 )
 @make_rule_decorator("D2R006", WARNING, "PAIRED together with CODE 0")
 def _check_timed_pairs(case: Case) -> Iterator[Objection]:
-    """A pair acts in turn by a force. Two unpaired sets are enough for a window that is defined by times (CODE 0).
+    """The sets of a pair act in turn on a force. Two unpaired sets suffice for a window defined by times (CODE 0).
 
     Fix: Set PAIRED and RELSW to 0.
     """
