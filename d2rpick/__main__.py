@@ -5,6 +5,8 @@ import os
 import signal
 import sys
 
+_SOON = 0.01  # time until an interrupt that was swallowed is repeated [s]
+
 
 def main() -> None:
     """Run the command line.
@@ -23,9 +25,16 @@ def main() -> None:
     def interrupt(number: int, _: object) -> None:
         """Raise KeyboardInterrupt, and remember the signal, because a library may swallow the error."""
         interrupts.append(number)
-        # An error that is swallowed while an object is deleted would print a traceback.
-        sys.unraisablehook = lambda _: None
+        sys.unraisablehook = interrupt_again
         raise KeyboardInterrupt
+
+    def interrupt_again(ignored: "sys.UnraisableHookArgs") -> None:
+        """Repeat an interrupt that is swallowed while an object is deleted; print no traceback of it."""
+        if ignored.exc_type is KeyboardInterrupt:
+            from threading import Timer
+
+            # Raised here, it would be swallowed again.
+            Timer(_SOON, os.kill, (os.getpid(), signal.SIGINT)).start()
 
     try:
         # A background job has another handler, because it ignores interrupts.

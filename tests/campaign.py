@@ -1,9 +1,9 @@
 """Feed damaged inputs of all formats to the readers: ``python -m tests.campaign --inputs 1000000 --seed 1``.
 
 Each input depends only on the seed and its number.  For any damage a reader must either return numbers that are in the
-file or raise a d2rpick error of one line.  Anything else is a fault, including a warning and the death of the process.
-The campaign prints counts for each format; the exit code is 1 if there is a fault.  ``--only FORMAT NUMBER`` repeats
-one input.
+file or raise a d2rpick error of one line; a settings file with any value is used or refused with one line.  Anything
+else is a fault, including a warning and the death of the process.  The campaign prints counts for each format; the exit
+code is 1 if there is a fault.  ``--only FORMAT NUMBER`` repeats one input.
 
 ``--relations`` compares answers instead: it changes a history in a way that must not change the answer, or must change
 it in a known way (`tests.relations`).  An answer that does not follow is a fault.
@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from contextlib import chdir
 from functools import cache, partial
 from pathlib import Path
 from random import Random
@@ -23,11 +24,13 @@ from typing import Final
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import choose_farm, count_cores
+from d2rpick.cli import COMMANDS
 from d2rpick.deck.reader import read_deck
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.formats.d3plot import open_legs
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, Source, open_run
+from tests.cli.test_settings_files import ask_with_settings, list_options
 from tests.command import DECK
 from tests.damaged_files import FILES
 from tests.faults import Fault, damage
@@ -152,9 +155,40 @@ def companions(random: Random) -> bool:
         return bool(_read(lambda: open_run([folder], selection).history(selection)))
 
 
+def settings(random: Random) -> bool:
+    """Give a setting a value of any type of TOML; return True if it was taken."""
+    command = random.choice([*COMMANDS])
+    key = random.choice(list_options(command))
+    value = draw_toml_value(random, depth=2)
+    table = random.choice((f"[{command}]\n", ""))
+    with TemporaryDirectory() as folder, chdir(folder):
+        return not ask_with_settings(command, f'{table}"{key}" = {value}\n')
+
+
+def draw_toml_value(random: Random, depth: int) -> str:
+    """Draw a value of any type of TOML, with arrays and tables up to this ``depth``."""
+    kind = random.choice(("text", "whole", "real", "time", "word", "array", "table"))
+    if kind in ("array", "table") and depth:
+        inner = [draw_toml_value(random, depth - 1) for _ in range(random.randrange(4))]
+        if kind == "array":
+            return f"[{', '.join(inner)}]"
+        return f"{{{', '.join(f'k{row} = {item}' for row, item in enumerate(inner))}}}"
+    if kind == "text":
+        codes = [random.choice((random.randrange(128), 0x20AC, 0x1F4A9)) for _ in "123"]
+        return '"' + "".join(f"\\U{code:08x}" for code in codes) + '"'
+    if kind == "real":
+        return random.choice(("inf", "-inf", "nan", repr(random.gauss(0, 1) * 1e6)))
+    if kind == "time":
+        return random.choice(("1979-05-27", "07:32:00.5", "1979-05-27T07:32:00+02:00"))
+    if kind == "word":
+        return random.choice(("true", "false", "'auto'", "'csv'", "'0.1 0.2'", "'3,7'"))
+    return str(random.choice((0, 1, -1, 2**63, 10**400, random.randrange(1000))))
+
+
 FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
     "glstat": glstat, "matsum": matsum, "binout": binout, "radioss-th": time_history, "hdf5": hdf5, "csv": csv,
     "d3plot": d3plot, "curves": curves, "deck": deck, "companions": companions,
+    "settings": settings,
 }  # fmt: skip
 
 

@@ -1,12 +1,14 @@
 """Damaged inputs of all formats are read or refused, a million with ``D2RPICK_THOROUGH=20``; answers follow changes."""
 
 from collections import Counter
+from functools import partial
+from random import Random
 
 import pytest
 
 from tests.campaign import FORMATS, run_case
 from tests.faults import count_inputs
-from tests.relations import RELATIONS
+from tests.relations import RELATIONS, Chosen, find_difference, make_run
 
 
 @pytest.mark.slow
@@ -24,10 +26,31 @@ def test_whatever_the_damage_an_input_is_read_or_refused(form: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "relation", [name for name, relation in RELATIONS.items() if relation.exact]
-)
-def test_an_answer_does_not_change_with_what_must_not_matter(relation: str) -> None:
+@pytest.mark.parametrize("relation", RELATIONS)
+def test_an_answer_follows_what_changes_its_history(relation: str) -> None:
     outcomes = Counter(run_case(relation, 0, number) for number in range(3))
     assert outcomes.keys() <= {"read", "refused"}
     assert outcomes["read"] > 0
+
+
+def test_half_of_the_states_still_show_the_fastest_mode() -> None:
+    fewest = RELATIONS["every second state"].fewest_states
+    runs = [make_run(Random(seed), fewest) for seed in range(50)]
+    assert min(run.states_per_period for run in runs) >= fewest >= 4
+    assert any(make_run(Random(seed)).states_per_period < fewest for seed in range(50))
+
+
+def test_only_a_tr_before_the_first_state_that_is_left_may_be_lost() -> None:
+    relation, run = RELATIONS["every second state"], make_run(Random(1))
+    step = float(run.time[1] - run.time[0])
+    early, late = run.load_end + step, run.load_end + 9 * step
+    choose = partial(Chosen, half_width=0.0, residual_width=0.0, grade="good", basis="oscillator")  # fmt: skip
+    first = choose(early, residual=0.1, listed=(early, late))
+    for second, is_fault in (
+        (choose(late, residual=0.2, listed=(late,)), False),
+        (choose(late, residual=0.2, listed=(early, late)), True),
+        (choose(late + step, residual=0.2, listed=(late + step,)), True),
+    ):
+        assert bool(find_difference(relation, run, first, second)) is is_fault
+    later = first._replace(tr=late)
+    assert find_difference(relation, run, later, choose(early, residual=0.1))

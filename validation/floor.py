@@ -115,13 +115,18 @@ def main() -> None:
         prog="python -m validation.floor", description=__doc__
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("model", nargs="*", choices=[*TD], default=[*TD])
+    parser.add_argument(
+        "model", nargs="*", metavar="MODEL", help=f"of {', '.join(TD)}; by default all"
+    )
     given = parser.parse_args()
+    unknown = {*given.model} - {*TD}
+    if unknown:
+        parser.error(f"no model {', '.join(sorted(unknown))}; choose {', '.join(TD)}")
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         sys.exit("OPENRADIOSS_PATH is not set; it names the folder of OpenRadioss")
     print(*Floor._fields, sep=",")
-    for name in given.model:
+    for name in given.model or TD:
         for row in study_floor(name, given.folder, Path(solver)):
             print(
                 row.model, *(f"{value:.4g}" for value in row[1:]), sep=",", flush=True

@@ -5,14 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import time
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from itertools import islice
 from multiprocessing import (
     Pipe,
@@ -20,6 +15,7 @@ from multiprocessing import (
     get_context,
     set_forkserver_preload,
 )
+from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
@@ -63,6 +59,14 @@ class Finished(NamedTuple):
     error: BaseException | None
 
 
+class _Call(NamedTuple):
+    """The call for one item; it ``is_suspect`` if the pool that computed it broke."""
+
+    number: int
+    item: Any
+    is_suspect: bool = False
+
+
 class Farm:
     """Computes calls in the calling process, one after another; derived classes compute them elsewhere."""
 
@@ -90,7 +94,11 @@ def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> F
 
 
 class Cores(Farm):
-    """A pool of processes on this machine, each of which has imported ``module`` before its first call."""
+    """A pool of processes on this machine, each of which has imported ``module`` before its first call.
+
+    A thread of its own uses the pool.  An interrupt is raised in the main thread at any line, and one that is raised
+    where the main thread holds a lock of the pool would leave it locked, so that the program could never end.
+    """
 
     def __init__(self, processes: int, module: str) -> None:
         start_importing(processes, module)
@@ -98,10 +106,12 @@ class Cores(Farm):
         # Closing this end of the pipe makes the processes exit.
         self._held, self._leash = Pipe(duplex=False)
         self._pool = self._new(processes)
+        self._is_closed = False
 
     def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._is_closed = True
         self._leash.close()
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
@@ -111,22 +121,55 @@ class Cores(Farm):
         If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
         and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
         """
-        queue = iter(enumerate(items))
-        running: dict[Future[Result], tuple[int, Item]] = {}
-        while True:
-            for number, item in islice(queue, self.room - len(running)):
-                running[self._submit(function, item)] = number, item
-            if not running:
+        queue = enumerate(items)
+        # An interrupt leaves these queues, which are not written in Python, as they are.
+        calls = SimpleQueue[_Call | None]()
+        finished = SimpleQueue[Finished | BaseException]()
+        Thread(
+            target=self._compute, args=(function, calls, finished), daemon=True
+        ).start()
+        running = 0
+        try:
+            while True:
+                for number, item in islice(queue, self.room - running):
+                    calls.put(_Call(number, item))
+                    running += 1
+                if not running:
+                    return
+                answer = finished.get()
+                if isinstance(answer, BaseException):
+                    raise answer
+                running -= 1
+                yield answer
+        finally:
+            calls.put(None)
+
+    def _compute(
+        self,
+        function: Callable[[Any], Any],
+        calls: SimpleQueue[_Call | None],
+        finished: SimpleQueue[Finished | BaseException],
+    ) -> None:
+        """Compute ``calls`` until None, and put each answer into ``finished``, or an error that ends all calls."""
+
+        def hand_over(call: _Call, future: Future[Any]) -> None:
+            """Hand over the answer to a call, or the call itself if it is to be repeated."""
+            if future.cancelled():
                 return
-            suspects = []
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                number, item = running.pop(future)
-                if isinstance(future.exception(), BrokenProcessPool):
-                    suspects.append((number, item))
+            if isinstance(future.exception(), BrokenProcessPool):
+                calls.put(call._replace(is_suspect=True))
+            else:
+                finished.put(_make_answer(call.number, future))
+
+        try:
+            while (call := calls.get()) and not self._is_closed:
+                if call.is_suspect:
+                    finished.put(self._answer_alone(call.number, function, call.item))
                 else:
-                    yield _make_answer(number, future)
-            for number, item in suspects:
-                yield self._answer_alone(number, function, item)
+                    future = self._submit(function, call.item)
+                    future.add_done_callback(partial(hand_over, call))
+        except BaseException as error:  # noqa: BLE001  it is raised where the answers are awaited
+            finished.put(error)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Submit a call to the pool; if the pool is broken, start a new pool."""
@@ -142,11 +185,9 @@ class Cores(Farm):
     ) -> Finished:
         """Compute a call in a pool of its own, so that a crash of its process affects no other call."""
         pool, future = self._begin_pool(1, function, item)
-        try:
-            return _make_answer(number, future)
-        finally:
-            # With wait=True, an interrupt would only take effect after the call.
-            pool.shutdown(wait=False)
+        answer = _make_answer(number, future)
+        pool.shutdown(wait=False)
+        return answer
 
     def _begin_pool(
         self, processes: int, function: Callable[[Item], Result], item: Item

@@ -301,7 +301,10 @@ class Placement:
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
     def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
-        """Return the positions (3,) of the watched nodes of the given parts [length], keyed by node number."""
+        """Return the positions (3,) of the watched nodes of the given parts [length], keyed by node number.
+
+        Nodes whose motion is written in local axes are left out.
+        """
         inventory = self._inventory
         numbers = dict(
             zip(inventory.watched.tolist(), inventory.watched_ids.tolist(), strict=True)
@@ -310,6 +313,7 @@ class Placement:
             numbers[node]: position
             for part in parts
             for node, position in self.parts[part].watched.items()
+            if numbers[node] not in inventory.local_ids
         }
 
     def find_nodes(self, parts: Collection[int]) -> Reals:

@@ -188,7 +188,9 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
     )
     notes = (*_list_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
     joints = ls_dyna_loads.read_joints(deck)
-    watched = mesh.table.known(_read_watched_nodes(deck))
+    local_nodes = _read_watched_nodes(deck, local=True)
+    watched_nodes = np.union1d(_read_watched_nodes(deck, local=False), local_nodes)
+    watched = mesh.table.known(watched_nodes)
     return Inventory(
         "ls-dyna",
         _build_parts(deck, parts, mesh),
@@ -200,6 +202,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
         ties=joints.unknown,
         watched=watched,
         watched_ids=mesh.table.ids[watched],
+        local_ids=frozenset(local_nodes.tolist()),
         moved=_has_moved_nodes(deck),
         files=tuple(deck.sources),
         boundary=ls_dyna_loads.read_ls_dyna_boundary(
@@ -283,12 +286,15 @@ def _list_nodes(
                 )
 
 
-def _read_watched_nodes(deck: Deck) -> Integers:
-    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line if it has a title."""
+def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line if it has a title.
+
+    If ``local`` is True, return only nodes whose motion is written in a local coordinate system, else only others.
+    """
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
-        if set(options) <= {"ID", "LOCAL"}:
+        if set(options) <= {"ID", "LOCAL"} and ("LOCAL" in options) is local:
             line = make_watched_line(card.width, 1 if options else 8)
             node_ids = [
                 lines.integers(line.layout).ravel()

@@ -236,6 +236,8 @@ class Inventory:
         Connections between unknown parts.
     watched, watched_ids : array
         Places of the nodes whose motion the run writes, and their numbers in the deck, both of shape (k,).
+    local_ids : frozenset of int
+        Numbers of the nodes whose motion is written in local axes, which may turn.
     moved : bool
         True if the deck moves nodes away from their coordinates.
     files : tuple of SourceFile
@@ -263,6 +265,7 @@ class Inventory:
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     watched_ids: Places = field(default_factory=lambda: np.empty(0, np.int64))
+    local_ids: frozenset[int] = frozenset()
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
     history_groups: frozenset[int] = frozenset()

@@ -165,7 +165,9 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     # Without an engine file, all bodies may be switched.
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}
     rigid = _find_always_rigid(windows) | find_parts_of_fixed_bodies(run)
-    watched = mesh.table.known(_find_watched_nodes(starter))
+    local_nodes = _find_watched_nodes(starter, local=True)
+    watched_nodes = np.union1d(_find_watched_nodes(starter, local=False), local_nodes)
+    watched = mesh.table.known(watched_nodes)
     return Inventory(
         "radioss",
         _collect_parts(starter, mesh, rigid),
@@ -178,6 +180,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
         ties=joints.unknown,
         watched=watched,
         watched_ids=mesh.table.ids[watched],
+        local_ids=frozenset(local_nodes.tolist()),
         moved=starter.transformed,
         files=tuple(run.deck.sources),
         history_groups=frozenset(
@@ -190,20 +193,24 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     )
 
 
-def _find_watched_nodes(starter: Starter) -> Integers:
-    """Return the node ids on a /TH/NODE card, below its title and its line of variables."""
+def _find_watched_nodes(starter: Starter, *, local: bool) -> Integers:
+    """Return the node ids on a /TH/NODE card, below its title and its line of variables.
+
+    If ``local`` is True, only those whose motion is written in a skew system, else only the others.
+    """
     rows = [
         row
         for card in starter.named("TH")
         if card.words[1:2] == ("NODE",)
         for row in get_lines_below_title(card)
     ]
-    ids = (ID_LIST["ID1"].cut(row.text).strip() for row in rows)
-    return np.unique(
-        np.array(
-            [int(text) for text in ids if text.isdecimal() and int(text)], np.int64
-        )
-    )
+    ids = []
+    for row in rows:
+        number, skew = (ID_LIST[name].cut(row.text).strip() for name in ("ID1", "ID2"))
+        is_local = skew.isdecimal() and int(skew) > 0
+        if number.isdecimal() and int(number) and is_local is local:
+            ids.append(int(number))
+    return np.unique(np.array(ids, np.int64))
 
 
 def _collect_notes(run: RadiossRun, starter: Starter) -> Iterator[str]:

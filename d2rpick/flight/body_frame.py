@@ -24,6 +24,8 @@ _MOST_BENT: Final = 0.05
 _MOST: Final = 0.5
 # Largest ratio of one moment of inertia to the others at which points are treated as lying on a line [-].
 _ALONG_LINE: Final = 1e-9
+# Relative error of a time that is written in single precision [-].
+_ROUNDED_TIME: Final = 1e-6
 # Number of nodes, spread over the body, that define the frame of the body; more would hardly improve it.
 _MOST_NODES: Final = 50
 
@@ -70,17 +72,26 @@ def find_frame_of_nodes(
     displacements: Displacements,
     time: Samples,
 ) -> Frame | None:
-    """Find the orientation of parts (ids) at times (n,) from the written motion of their nodes; None if unknown."""
+    """Find the orientation of parts (ids) at times (n,) from the written motion of their nodes.
+
+    None if it is unknown, also because the motion is not written throughout these times.
+    """
     coordinates = placement.find_watched_nodes(parts)
     spread_ids = list(coordinates)[:: -(-len(coordinates) // _MOST_NODES) or 1]
     motion = displacements(spread_ids)
-    if motion is None:
+    if motion is None or not _is_within(time, motion.time):
         return None
     deck = np.stack([coordinates[id_] for id_ in motion.ids])
     moved = motion.displacements.reshape(motion.time.size, -1)
     at_times = [np.interp(time, motion.time, column) for column in moved.T]
     where = deck + np.stack(at_times, axis=1).reshape(time.size, -1, 3)
     return fit_frame(deck, where, np.ones(len(deck)))
+
+
+def _is_within(wanted: Samples, written: Samples) -> bool:
+    """Return True if times (n,) lie within the span of the written times (k,), except for rounding."""
+    room = _ROUNDED_TIME * float(np.abs(wanted).max())
+    return bool(written[0] <= wanted[0] + room and written[-1] >= wanted[-1] - room)
 
 
 def choose_frame_parts(

@@ -107,16 +107,15 @@ class Flight(NamedTuple):
         return self.source in _SURE or (self.source in _PARTIAL and self.described)
 
 
-def _return_false(_: float) -> bool:
-    """Return False for any time, as the default of ``is_contradicted``."""
-    return False
+def _explain_nothing(_: float) -> None:
+    """Return no contradiction for any time, as the default of ``explain_contradiction``."""
 
 
 class Witness(NamedTuple):
     """A source of evidence for flights: the flight ``around`` a time, and all ``flights`` in ascending order.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
-    ``is_contradicted`` returns True for a time if only the internal energy speaks against a flight at that time.
+    ``explain_contradiction`` returns, for a time at which the momentum alone shows a flight, what speaks against it.
     """
 
     source: str
@@ -124,7 +123,7 @@ class Witness(NamedTuple):
     around: Callable[[float], FreeFlight | None]
     flights: Callable[[], tuple[FreeFlight, ...]]
     decisive: bool
-    is_contradicted: Callable[[float], bool]
+    explain_contradiction: Callable[[float], str | None]
 
     @classmethod
     def of(
@@ -134,7 +133,7 @@ class Witness(NamedTuple):
         around: Callable[[float], FreeFlight | None],
         *,
         decisive: bool,
-        is_contradicted: Callable[[float], bool] = _return_false,
+        explain_contradiction: Callable[[float], str | None] = _explain_nothing,
     ) -> Witness:
         """Make a source of evidence over the times ``time`` (n,) that computes each flight and their list only once."""
         once = cache(around)
@@ -150,7 +149,7 @@ class Witness(NamedTuple):
                 )
             ),
             decisive,
-            is_contradicted,
+            explain_contradiction,
         )
 
     def holding(self, td: float) -> FreeFlight | None:
@@ -236,12 +235,9 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 def _explain_refusal(witness: Witness, td: float) -> str:
     """Return the reason why td [time] is in no flight, even if the momentum alone shows a flight there."""
-    if witness.is_contradicted(td):
-        contradiction = (
-            f"the momentum is that of free flight at td = {td:.6g}, but the internal "
-            "energy is not that of a free vibration"
-        )
-        return f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
+    contradiction = witness.explain_contradiction(td)
+    if contradiction:
+        return contradiction
     return f"the {name_source(witness.source)} shows no free flight at td = {td:.6g}"
 
 
@@ -307,7 +303,9 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
             momenta[0].time,
             around,
             decisive=decisive,
-            is_contradicted=partial(_has_flight_by_momentum, history, momenta),
+            explain_contradiction=partial(
+                _explain_contradicted_momentum, history, momenta
+            ),
         )
     forces = history.evidence.forces
     whole = history.find_momenta(of_parts=False)
@@ -344,14 +342,25 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         )
 
 
-def _has_flight_by_momentum(
+def _explain_contradicted_momentum(
     history: History, momenta: Sequence[Momenta], td: float
-) -> bool:
-    """Return True if the momentum alone, without the internal energy, shows a flight at ``td`` [time]."""
+) -> str | None:
+    """Return what the energies say against a flight that the momentum alone shows at ``td`` [time], if it shows one."""
     from d2rpick.flight.momentum import find_flight_around
 
-    return any(
+    flights = [
         find_flight_around(candidate, td, history.balance) for candidate in momenta
+    ]
+    flight = next(filter(None, flights), None)
+    if flight is None:
+        return None
+    contradiction = (
+        f"the momentum is that of free flight at td = {td:.6g}, but the internal "
+        "energy is not that of a free vibration"
+    )
+    return (
+        _explain_why_driven(history, "momentum", flight)
+        or f"{contradiction}: parts of the model may touch each other, or the energies are wrong"
     )
 
 
@@ -364,10 +373,29 @@ def _find_flight_by_momentum(
     for candidate in momenta:
         flight = find_flight_around(candidate, td, history.balance)
         if flight:
+            flight = _limit_to_undriven(history, flight, td)
             if candidate.parts is not None or candidate.flying:
                 return flight
             return _limit_to_level(history, flight, td, candidate)
     return None
+
+
+def _limit_to_undriven(
+    history: History, flight: FreeFlight, td: float
+) -> FreeFlight | None:
+    """Return the part of a flight by momentum in which no load does work on the model; None if one does at td.
+
+    Opposite forces, and weak ones, drive the model although its momentum hardly shows them.
+    """
+    from d2rpick.flight.work import limit_to_undriven
+
+    if not _explain_why_driven(history, "momentum", flight):
+        return flight
+    assert history.balance
+    limited = limit_to_undriven(history.balance, flight, td)
+    if limited is None or limited.end - limited.start < SHORTEST * history.duration:
+        return None
+    return None if _explain_why_driven(history, "momentum", limited) else limited
 
 
 def _find_flight_by_energies(
@@ -452,7 +480,15 @@ def _limit_to_level(
             damped = None
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
-    start = find_settled_time(time, energy, damped, flight.start, flight.end, unseen)
+    start = find_settled_time(
+        time,
+        energy,
+        damped,
+        flight.start,
+        flight.end,
+        unseen,
+        driven=isinf(flight.gravity),
+    )
     if start is not None and start > flight.start and momenta is not None:
         # The last sum of energies excludes the work of gravity, whereas the first sum includes it.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]

@@ -272,6 +272,8 @@ def find_settled_time(
     start: float,
     end: float,
     unseen: float = 0.0,
+    *,
+    driven: bool = False,
 ) -> float | None:
     """Return the time in a window after which an internal energy keeps its level; None if it drifts until the end.
 
@@ -285,6 +287,9 @@ def find_settled_time(
         [time]
     unseen : float
         Rounding of these energies: the level may fall by it as well [energy].
+    driven : bool
+        The energies grow under a load of unknown size.  A steady push makes a body swing about one level too, so slow
+        swings then do not show a free vibration.
     """
     inside = find_window(time, start, end)
     rounding = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
@@ -296,7 +301,8 @@ def find_settled_time(
         else:
             lost = _sum_later_losses(damped[:, first:last]) + unseen
         states = energy[first:last], lost, rounding
-        first_kept = 0 if _has_slow_swings(*states) else _find_first_kept(*states)
+        is_slow = not driven and _has_slow_swings(*states)
+        first_kept = 0 if is_slow else _find_first_kept(*states)
         if first_kept is not None:
             return (
                 start
@@ -391,7 +397,8 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
     if width <= least:
         return True
     first_half, second_half = np.array_split(energy, 2)
-    taken = 0.0 if np.isinf(lost[0]) else float(lost[0] - lost[-1])
+    # Near the end of a fall, the sum of energies is larger than in its last quarter, although damping takes nothing.
+    taken = 0.0 if np.isinf(lost[0]) else float(lost[0])
     drift = float(second_half.mean() - first_half.mean())
     if abs(drift) > _DRIFT * _ALIKE * width + (taken if drift < 0 else 0.0):
         return False

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.memory import remember
-from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, find_lasting_window
+from d2rpick.flight.window import (
+    FEWEST,
+    Constant,
+    FreeFlight,
+    Law,
+    find_lasting_window,
+    find_longest_window,
+)
 from d2rpick.histories.samples import find_window, integrate_by_trapezia
 
 if TYPE_CHECKING:
@@ -62,8 +69,63 @@ def compute_work_beyond_gravity(
     inside = find_window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
         return None
+    law = _make_law_of_external_work(balance)
+    return law.misfit(inside.start, inside.stop - 1)
+
+
+def limit_to_undriven(
+    balance: Balance, flight: FreeFlight, td: float
+) -> FreeFlight | None:
+    """Return the part of a flight around ``td`` [time] in which gravity and damping explain the external work.
+
+    A couple of opposite forces drives a model and leaves its momentum alone, and so does nearly a weak load.  None if
+    the work is not written, or if a load does work at td.
+    """
+    time = balance.time
+    inside = find_window(time, flight.start, flight.end)
+    at = int(np.searchsorted(time, td))
+    if balance.external_work is None or not inside.start <= at < inside.stop:
+        return None
+    law = _make_law_of_external_work(balance)
+    first, last = find_longest_window(law, at, 0.0)
+    start = max(flight.start, float(time[first]))
+    end = min(flight.end, float(time[last]))
+    end_seen = flight.end_seen or end < flight.end
+    return flight._replace(start=start, end=end, end_seen=end_seen)
+
+
+@remember
+def _make_law_of_external_work(balance: Balance) -> _ExternalWork:
+    """Return the law of the external work in free flight."""
+    return _ExternalWork(balance)
+
+
+class _ExternalWork(Law):
+    """Law that gravity and damping do all external work; the misfit is the work that they do not explain [energy].
+
+    Errors of digits and of the solver's sums are subtracted, so that the misfit is 0 in a free flight.
+    """
+
+    def __init__(self, balance: Balance) -> None:
+        super().__init__(balance.time)
+        assert balance.external_work is not None
+        self._balance = balance
+        self._work = balance.external_work
+
+    def _misfit(self, first: int, last: int) -> float:
+        if last - first + 1 < FEWEST_STATES:
+            return 0.0
+        return _measure_unexplained_work(
+            self._balance, self._work, slice(first, last + 1)
+        )
+
+
+def _measure_unexplained_work(
+    balance: Balance, external_work: Samples, inside: slice
+) -> float:
+    """Return the largest external work in some states that neither gravity nor damping explains [energy]."""
     time = balance.time[inside]
-    work = balance.external_work[inside]
+    work = external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])
     free = [np.ones_like(time)]
     most_gravity = np.inf

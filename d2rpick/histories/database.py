@@ -138,8 +138,13 @@ class Database:
         """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
+    @cached_property
+    def node_time(self) -> Samples:
+        """Times of the nodes, shape (k,) [time]."""
+        return self.time
+
     def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
-        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (k, len(ids), 3)."""
         raise FormatError(f"{self.source}: displacements of nodes are not read from it")
 
     @property
@@ -313,10 +318,15 @@ class Legs:
             common.intersection_update(leg.node_ids)
         return tuple(id_ for id_ in self._legs[0].node_ids if id_ in common)
 
+    @cached_property
+    def node_time(self) -> Samples:
+        """Times of the nodes, shape (k,) [time]."""
+        return self._joined([leg.node_time for leg in self._legs], self._nodes_kept)
+
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some of ``node_ids`` since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of some of ``node_ids`` since the start of the run, shape (k, len(ids), 3)."""
         return self._joined(
-            [leg.node_displacements(ids) for leg in self._legs], self._kept[0]
+            [leg.node_displacements(ids) for leg in self._legs], self._nodes_kept
         )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
@@ -354,6 +364,11 @@ class Legs:
     def _parts_kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Valid states of the parts, and notes on invalid states."""
         return self._order([leg.part_time for leg in self._legs])
+
+    @cached_property
+    def _nodes_kept(self) -> NDArray[np.bool_]:
+        """Valid states of the nodes."""
+        return self._order([leg.node_time for leg in self._legs])[0]
 
     def _order(
         self, times: Sequence[Samples]

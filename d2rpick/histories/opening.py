@@ -38,13 +38,15 @@ __all__ = [
     "open_sources",
 ]
 
-# Number of bytes that contain the header of a file and at least one state, even if its blocks are long.
+# Number of bytes that contain the header of a file and more than one state, even if its blocks are long.
 _HEAD = 8192
 _DEFAULT = Selection()
 # Largest length of the legend in an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
 # Largest number of unused tables named in a note.
 _MOST_TABLES: Final = 3
+# Words that LS-DYNA prints above the states in a nodout.
+_NODOUT: Final = b"n o d a l   p r i n t   o u t"
 # Characters at the end of the name of a later file in a family.
 _DIGITS: Final = "0123456789"
 
@@ -120,13 +122,21 @@ def open_sources(
 
     ``notes_on_names`` are about the names by which the files were found.
     """
-    with_forces = []
+    with_forces: list[Source] = []
+    with_nodes: list[Source] = []
     if input_format == "auto":
         with_forces = [source for source in sources if _is_force_listing(source)]
-    sources = [source for source in sources if source not in with_forces]
+        with_nodes = [source for source in sources if _is_node_listing(source)]
+    listings = (*with_forces, *with_nodes)
+    sources = [source for source in sources if source not in listings]
     if not sources and with_forces:
         raise FormatError(
             f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which has forces and no internal energy; "
+            "name the glstat, matsum or binout of the run with it"
+        )
+    if not sources and with_nodes:
+        raise FormatError(
+            f"{with_nodes[0].name}: this is the nodout of LS-DYNA, which has no internal energy; "
             "name the glstat, matsum or binout of the run with it"
         )
     kinds, left_out = _sort_by_format(sources, input_format)
@@ -138,6 +148,7 @@ def open_sources(
     read_sources = [source for kind in ordered for source in kinds[kind]]
     if not unread:
         read_sources += with_forces
+    read_sources += with_nodes
     used = {source.name for source in read_sources}
     for legs in opened.values():
         check_legs(legs)
@@ -156,7 +167,7 @@ def open_sources(
     later_files = set[str]()
     for kind in FAMILIES:
         later_files |= _find_later_files(kinds.get(kind, ()))
-    files = tuple(source for source in (*sources, *with_forces) if source.name in used)
+    files = tuple(source for source in (*sources, *listings) if source.name in used)
     # The first file of a family stands for all files of the family.
     names = tuple(source.name for source in files if source.name not in later_files)
     reopen = partial(_reopen, files, selection, input_format, notes_on_names)
@@ -166,6 +177,7 @@ def open_sources(
         files,
         notes=(*notes_on_names, *notes, *unread),
         forces=forces,
+        nodes=tuple(with_nodes),
         reopen=reopen,
     )
 
@@ -258,6 +270,16 @@ def _is_force_listing(source: Source) -> bool:
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
+
+
+def _is_node_listing(source: Source) -> bool:
+    """Return True if a file is a listing of nodes; files of families are never listings."""
+    if isinstance(source.data, Scattered) or _NODOUT not in _head_of(source):
+        return False
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.node_listings import recognises
+
+    return recognises(_head_of(source))
 
 
 def _read_force_listings(

@@ -57,7 +57,8 @@ class OpenedRun:
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
-    ``notes`` are on files that were not used; ``forces`` are those of files with forces only.
+    ``notes`` are on files that were not used; ``forces`` are those of files with forces only, and ``nodes`` are files
+    with the motion of nodes only.
     """
 
     def __init__(
@@ -68,11 +69,13 @@ class OpenedRun:
         surroundings: Surroundings = UNKNOWN,
         notes: tuple[str, ...] = (),
         forces: tuple[ContactForce, ...] = (),
+        nodes: tuple[Source, ...] = (),
         reopen: Callable[[Surroundings], OpenedRun] | None = None,
     ) -> None:
         self.sources, self.databases, self.files = sources, databases, files
         self.surroundings = surroundings
         self._notes, self._forces, self._reopen = notes, forces, reopen
+        self._nodes = nodes
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._reopen is None:
@@ -90,6 +93,7 @@ class OpenedRun:
             surroundings,
             self._notes,
             self._forces,
+            self._nodes,
             self._reopen,
         )
 
@@ -265,12 +269,10 @@ class OpenedRun:
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
         """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""
-        for database in self.databases:
-            written = [id_ for id_ in database.node_ids if id_ in ids]
-            if written:
-                values = database.node_displacements(written)
-                return NodeMotion(database.time, tuple(written), values)
-        return None
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.node_listings import find_motion
+
+        return find_motion(self.databases, self._nodes, set(ids))
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Return the total momentum of the given parts, or of the whole model; None if the files do not contain it."""

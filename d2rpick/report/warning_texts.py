@@ -67,8 +67,9 @@ EXPLANATIONS_BY_TOPIC: Final = {
             "Neither the parts nor the motion of nodes shows how the body rotates in the flight. If you give the "
             "deck, d2rpick assumes the worst rotation that the kinetic energy allows, so the margin before the next "
             "contact may be large. Without the deck, the margin may be too short.",
-            "Give the deck with --deck. In a Radioss run, also write the motion of at least three nodes of the body "
-            "that do not lie on a line (/TH/NODE). For other solvers, set the margin with --margin.",
+            "Give the deck with --deck, and write the motion of at least three nodes of the body that do not lie on "
+            "a line: /TH/NODE of Radioss, *DATABASE_HISTORY_NODE of LS-DYNA with the binout or nodout. Otherwise set "
+            "the margin with --margin.",
         ),
         "td-after-contact": Explanation(
             "The next contact begins before td, or td lies within the margin before it. The parts would hit something "

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import PIPE, Popen, check_output
+from threading import Condition, get_ident, main_thread
 
 import pytest
 
@@ -122,6 +123,26 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
     with farm() as workers:
         for done, _ in enumerate(workers.answers(square, items())):
             assert taken <= done + getattr(workers, "room", 1)
+
+
+def test_the_main_thread_holds_no_lock_of_the_pool(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An interrupt in the main thread would leave such a lock locked, and the program could never end."""
+    entered: list[bool] = []
+    enter = Condition.__enter__
+
+    def count_entries(condition: Condition) -> bool:
+        entered.append(get_ident() == main_thread().ident)
+        return enter(condition)
+
+    with Cores(2, __name__) as workers:
+        answers = workers.answers(square, [0, 1, 99, *range(2, 12)])
+        next(answers)  # the thread that uses the pool has been started
+        monkeypatch.setattr(Condition, "__enter__", count_entries)
+        assert len(list(answers)) == 12
+    assert entered
+    assert not any(entered)
 
 
 def test_there_is_a_core() -> None:

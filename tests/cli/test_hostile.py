@@ -111,8 +111,9 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
     assert process.returncode == -signal.SIGINT
 
 
+@pytest.mark.parametrize("rest", ["raise SystemExit(0)", "while True: pass"])
 def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: str
 ) -> None:
     """This happens in a finalizer of an object, or while an extension module is imported."""
     (tmp_path / "click.py").write_text(
@@ -121,7 +122,7 @@ def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
         "Swallowing()\n"
-        "raise SystemExit(0)\n"
+        f"{rest}\n"
     )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with start_program("info", ENERGY) as process:

@@ -204,6 +204,25 @@ def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> 
     assert inventory.complete
 
 
+def test_nodes_written_in_local_axes_show_no_rotation_of_their_part(
+    tmp_path: Path,
+) -> None:
+    """LS-DYNA writes them in the coordinate system of the card, Radioss in a skew system; both may turn."""
+    cards = f"*DATABASE_HISTORY_NODE\n{make_row(2, 3, width=10)}"
+    local = f"*DATABASE_HISTORY_NODE_LOCAL\n{make_row(3, 5, 1, width=10)}"
+    text = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}{cards}"
+    plain = Placement(dyna.read_text(tmp_path, f"{text}*END\n"))
+    assert {*plain.find_watched_nodes([7])} == {2, 3}
+    turned = Placement(dyna.read_text(tmp_path, f"{text}{local}*END\n"))
+    assert {*turned.find_watched_nodes([7])} == {2}
+    rows = "         2         0second\n         3         4third\n"
+    deck = (
+        f"{rad.write_nodes(8)}{PART}/TH/NODE/1\nnodes\nDX        DY        DZ\n{rows}"
+    )
+    skewed = Placement(rad.read_text(tmp_path, deck))
+    assert {*skewed.find_watched_nodes([1])} == {2}
+
+
 @pytest.mark.parametrize(
     ("text", "placed"),
     [

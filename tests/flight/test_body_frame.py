@@ -129,15 +129,18 @@ def make_momenta_of_box(box: Box, first: int = 0) -> Momenta:
 
 
 def find_drift_of_box(
-    box: Box, nodes: Sequence[int] = CORNER_IDS, first: int = 0
+    box: Box,
+    nodes: Sequence[int] = CORNER_IDS,
+    first: int = 0,
+    states: slice = slice(None),
 ) -> Drift | None:
-    """Return the drift in a record that begins with state ``first`` and has the motion of some nodes."""
+    """Return the drift in a record that begins with state ``first`` and has the motion of some nodes in some states."""
 
     def read_displacements(ids: Sequence[int]) -> NodeMotion | None:
         written = tuple(id_ for id_ in ids if id_ in nodes)
         columns = [CORNER_IDS.index(id_) for id_ in written]
         moved = box.corners[:, columns] - CORNERS[columns]
-        return NodeMotion(TIME, written, moved) if written else None
+        return NodeMotion(TIME[states], written, moved[states]) if written else None
 
     flying = Flying(make_momenta_of_box(box, first), MASSES, range(4), START, END)
     return find_drift(flying, make_deck(), read_displacements)
@@ -154,6 +157,17 @@ def test_three_nodes_beside_a_line_show_how_a_box_turns_and_two_do_not() -> None
     assert get_turning(find_drift_of_box(BOX, (11, 14, 15)))
     for nodes in ((), (11, 18)):
         assert require(find_drift_of_box(BOX, nodes)).turning is None
+
+
+def test_nodes_show_how_a_box_turns_if_they_are_written_throughout_the_flight() -> None:
+    """They have their own output interval, and their file may begin later or end earlier."""
+    last = int(np.searchsorted(TIME, END))
+    first = int(np.searchsorted(TIME, START))
+    every = get_turning(find_drift_of_box(BOX))
+    rarer = get_turning(find_drift_of_box(BOX, states=slice(None, None, 5)))
+    np.testing.assert_allclose(rarer.rate, every.rate, rtol=0.02)
+    for states in (slice(last - 5), slice(first + 5, None)):
+        assert require(find_drift_of_box(BOX, states=states)).turning is None
 
 
 def test_nodes_at_other_places_than_in_the_deck_show_no_frame() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest_in_history
 from d2rpick.choice.pair.situation import examine_td
@@ -349,6 +350,66 @@ def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_do
         )
         is None
     )
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.2, 2.0, 2.4, 2.8])
+def test_a_few_swings_keep_their_level_in_a_fall_although_gravity_feeds_the_sum(
+    phase: float,
+) -> None:
+    """The sum of energies grows by far more than the vibration has; its work of gravity is no loss by damping."""
+    swings = 5 * np.sin(8 * TIME + phase) ** 2
+    falling = 1000 + 400 * TIME**2
+    sums = np.stack([falling, falling - 400 * TIME**2])
+    assert find_settled_time(TIME, swings, sums, 0.0, 1.0) == 0.0
+
+
+def test_a_few_swings_show_no_flight_while_a_load_of_unknown_size_works() -> None:
+    """A steady push makes a body swing about one level, too."""
+    swings = 5 * np.sin(8 * TIME + 0.8) ** 2
+    pushed = 1000 + 400 * TIME[np.newaxis] ** 2
+    assert find_settled_time(TIME, swings, pushed, 0.0, 1.0) == 0.0
+    settled = find_settled_time(TIME, swings, pushed, 0.0, 1.0, driven=True)
+    assert settled is None or settled > 0.5
+
+
+@settings(max_examples=25)
+@given(
+    start=st.floats(0.3, 0.5),
+    length=st.floats(0.05, 0.25),
+    share=st.floats(0.3, 4.0),
+    gravity=st.sampled_from([0.0, 9.81]),
+)
+def test_a_couple_drives_the_body_for_a_while_and_it_flies_before_and_after(
+    start: float, length: float, share: float, gravity: float
+) -> None:
+    """Opposite forces change no momentum; only the external work shows when they act."""
+    mass = 10.0
+    velocity = np.stack([3 + ZERO, ZERO, 2 - gravity * TIME], axis=1)
+    moving = mass / 2 * np.sum(velocity**2, axis=1)
+    acting = np.clip((TIME - start) / length, 0.0, 1.0)
+    couple_work = 100 * share * np.sin(np.pi / 2 * acting) ** 2
+    vibration = 100 + couple_work
+    internal = vibration * np.sin(150 * TIME) ** 2
+    energies = Balance(
+        TIME,
+        internal,
+        moving + vibration - internal,
+        external_work=moving - moving[0] + couple_work,
+        velocity=velocity,
+        precision=Precision(6),
+    )
+    whole = Momenta(TIME, velocity[:, np.newaxis], None, Precision(6), (0,))
+    history = make_table(
+        TIME, internal, replace(whole, velocity=True), balance=energies
+    )
+    before, after = find_flights(history, PLAIN)
+    assert before.within(TIME)[0] == pytest.approx(0.0, abs=0.02)
+    assert start - 0.05 < before.within(TIME)[1] < start + 0.3 * length
+    assert start + 0.7 * length < after.within(TIME)[0] < start + length + 0.1
+    assert after.end is None
+    driven = examine_td(history, start + length / 2, PLAIN).flight
+    assert driven.refusal is not None
+    assert "a load drives it" in driven.refusal
 
 
 def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> (

@@ -120,11 +120,11 @@ def landings() -> Figure:
         axes.plot(
             time_before_landing, row_number + spread, "o", color=color, markersize=5
         )
-        axes.text(-50, row_number, label, va="center", ha="right")
+        axes.text(-77, row_number, label, va="center", ha="right")
     axes.axvline(0, color="black", linewidth=0.8)
     axes.text(-1, 1.42, "rigid in the contact", ha="right", va="center")
     axes.text(1, 1.42, "deformable before the contact", ha="left", va="center")
-    axes.set(xlim=(-48, 35), ylim=(-0.5, 1.6), yticks=[])
+    axes.set(xlim=(-75, 75), ylim=(-0.5, 1.6), yticks=[])
     axes.spines["left"].set_visible(False)
     name_axes(axes, "time from td to the landing of the switched run [ms]", "")
     return figure

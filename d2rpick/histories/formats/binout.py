@@ -10,6 +10,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, list_names
 from d2rpick.histories.database import DIGITS, Database
@@ -27,12 +29,15 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.content import Content
+    from d2rpick.histories.history import Samples
     from d2rpick.histories.resuming import ResumePoint
     from d2rpick.histories.source import Source
 
 __all__ = ["Binout", "open_legs", "recognises"]
 
 _BRANCHES: Final = ("glstat", "matsum")
+_NODES: Final = "nodout"
+_DISPLACEMENTS: Final = ("x_displacement", "y_displacement", "z_displacement")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
@@ -54,7 +59,8 @@ class Binout(Database):
 
     def __init__(self, files: Sequence[tuple[str, bytes | Content]]) -> None:
         self._files = [
-            Lsda(content, name, (*_BRANCHES, *FORCES)) for name, content in files
+            Lsda(content, name, (*_BRANCHES, _NODES, *FORCES))
+            for name, content in files
         ]
         self.source = ", ".join(name for name, _ in files)
         whole, parts = self._branches = [
@@ -94,6 +100,28 @@ class Binout(Database):
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts (one force for both sides of a contact) and of the rigid walls."""
         return read_binout_forces(self._files)
+
+    @cached_property
+    def _nodes(self) -> Branch:
+        """The branch nodout, whose variables are lists with one value for each node."""
+        return Branch(_NODES, self._files, by_part=True)
+
+    @cached_property
+    def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]  # a property overrides a field
+        """Numbers of the nodes with displacements in the branch nodout; none if its records are lost or damaged."""
+        if self._nodes.damage or not self._nodes.has_variables(_DISPLACEMENTS):
+            return ()
+        return self._nodes.part_ids
+
+    @cached_property
+    def node_time(self) -> Samples:
+        """Times of the states of the branch nodout, shape (k,) [time]."""
+        return self._nodes.time
+
+    def node_displacements(self, ids: Sequence[int]) -> Samples:
+        """Return the displacements of some nodes since the start of the run, shape (k, len(ids), 3)."""
+        components = [self._nodes.part_channel(name, ids) for name in _DISPLACEMENTS]
+        return np.stack(components, axis=2)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
         """Return where a later read of each file can begin: before the second-to-last state of both branches."""

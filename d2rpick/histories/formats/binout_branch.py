@@ -17,7 +17,7 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.names import clean_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
     from typing import Any
 
     from numpy.typing import NDArray
@@ -208,6 +208,12 @@ class Branch(Database):
         if self and not self._numbers.size:
             notes.append(f"{self.source} has no state yet")
         return tuple(notes)
+
+    def has_variables(self, names: Collection[str]) -> bool:
+        """Return True if there are states and each has all of these variables."""
+        return bool(self._variables) and all(
+            variables.keys() >= set(names) for variables in self._variables
+        )
 
     @property
     def scalars(self) -> tuple[str, ...]:
