@@ -86,7 +86,7 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-# Solver for a history whose format does not identify the solver.
+# Solver that is assumed if the format of a history does not identify one.
 DEFAULT: Final = "ls-dyna"
 
 

@@ -35,7 +35,7 @@ def is_restart(path: str) -> bool:
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # The error is reported by the check of the deck.
+        return False  # The deck check reports the error.
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 

@@ -1,4 +1,4 @@
-"""Recognise the quantity that a column, curve or dataset contains by its name in tables, HDF5 and databases.
+"""Recognise the quantity in a column, curve or dataset from its name in tables, HDF5 files and databases.
 
 A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are compared with these words,
 the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with

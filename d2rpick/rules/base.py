@@ -244,7 +244,7 @@ class Case:
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
-        """Return the switches that make parts rigid whose ids are known."""
+        """Return the switches to rigid whose parts are known."""
         return tuple(
             event
             for event in self.windows.events

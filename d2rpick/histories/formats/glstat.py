@@ -124,7 +124,7 @@ class Glstat(Blocks):
         return dict(zip(names, map(freeze, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
-        """Return the labels of all lines with values, except that of the time."""
+        """Return the labels of all lines with values, except the time."""
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}

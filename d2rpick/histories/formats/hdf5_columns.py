@@ -89,7 +89,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if the type of a dataset is damaged, or if data that h5py would read as zeros are missing."""
+    """Raise FormatError if the type of a dataset is damaged, or if data are missing, which h5py would read as zeros."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
