@@ -60,7 +60,7 @@ class Finished(NamedTuple):
 
 
 class _Call(NamedTuple):
-    """The call for one item; it ``is_suspect`` if the pool that computed it broke."""
+    """A call for one item; ``is_suspect`` is True if the pool that computed the call broke."""
 
     number: int
     item: Any
@@ -122,7 +122,7 @@ class Cores(Farm):
         and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
         """
         queue = enumerate(items)
-        # An interrupt leaves these queues, which are not written in Python, as they are.
+        # An interrupt cannot damage these queues, because they are not written in Python.
         calls = SimpleQueue[_Call | None]()
         finished = SimpleQueue[Finished | BaseException]()
         Thread(
@@ -150,10 +150,10 @@ class Cores(Farm):
         calls: SimpleQueue[_Call | None],
         finished: SimpleQueue[Finished | BaseException],
     ) -> None:
-        """Compute ``calls`` until None, and put each answer into ``finished``, or an error that ends all calls."""
+        """Compute ``calls`` until None arrives; put each answer, or an error that ends all calls, into ``finished``."""
 
         def hand_over(call: _Call, future: Future[Any]) -> None:
-            """Hand over the answer to a call, or the call itself if it is to be repeated."""
+            """Pass on the answer to a call, or the call itself if it has to be repeated."""
             if future.cancelled():
                 return
             if isinstance(future.exception(), BrokenProcessPool):

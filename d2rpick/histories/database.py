@@ -140,7 +140,7 @@ class Database:
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the nodes, shape (k,) [time]."""
+        """Times of the node states, shape (k,) [time]."""
         return self.time
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
@@ -320,7 +320,7 @@ class Legs:
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the nodes, shape (k,) [time]."""
+        """Times of the node states, shape (k,) [time]."""
         return self._joined([leg.node_time for leg in self._legs], self._nodes_kept)
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
@@ -367,7 +367,7 @@ class Legs:
 
     @cached_property
     def _nodes_kept(self) -> NDArray[np.bool_]:
-        """Valid states of the nodes."""
+        """Valid node states."""
         return self._order([leg.node_time for leg in self._legs])[0]
 
     def _order(

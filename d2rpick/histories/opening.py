@@ -273,7 +273,7 @@ def _is_force_listing(source: Source) -> bool:
 
 
 def _is_node_listing(source: Source) -> bool:
-    """Return True if a file is a listing of nodes; files of families are never listings."""
+    """Return True if a file is a node listing; a file of a family never is."""
     if isinstance(source.data, Scattered) or _NODOUT not in _head_of(source):
         return False
     # Imported here to keep start-up fast.

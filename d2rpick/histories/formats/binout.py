@@ -103,19 +103,19 @@ class Binout(Database):
 
     @cached_property
     def _nodes(self) -> Branch:
-        """The branch nodout, whose variables are lists with one value for each node."""
+        """The nodout branch, whose variables are lists with one value per node."""
         return Branch(_NODES, self._files, by_part=True)
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]  # a property overrides a field
-        """Numbers of the nodes with displacements in the branch nodout; none if its records are lost or damaged."""
+        """Numbers of the nodes with displacements in the nodout branch; none if its records are lost or damaged."""
         if self._nodes.damage or not self._nodes.has_variables(_DISPLACEMENTS):
             return ()
         return self._nodes.part_ids
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the states of the branch nodout, shape (k,) [time]."""
+        """Times of the states in the nodout branch, shape (k,) [time]."""
         return self._nodes.time
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:

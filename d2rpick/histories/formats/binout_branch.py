@@ -210,7 +210,7 @@ class Branch(Database):
         return tuple(notes)
 
     def has_variables(self, names: Collection[str]) -> bool:
-        """Return True if there are states and each has all of these variables."""
+        """Return True if the branch has states and all of them contain all of these variables."""
         return bool(self._variables) and all(
             variables.keys() >= set(names) for variables in self._variables
         )
