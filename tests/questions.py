@@ -1,6 +1,7 @@
-"""The index of the frequently asked questions: each question with a link, and the bold text that begins its answer.
+"""The indexes of the frequently asked questions: each question with a link, and the bold text that begins its answer.
 
-``python -m tests.questions`` writes it to docs/how-to/faq.md; a test holds it current.
+``python -m tests.questions`` writes them to docs/how-to/faq.md (before the cards) and switched-faq.md (from the cards
+on), so that each can be scanned at a glance; a test holds them current.
 """
 
 from __future__ import annotations
@@ -15,13 +16,24 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 FOLDER: Final = ROOT / "docs" / "how-to"
-INDEX: Final = FOLDER / "faq.md"
-# In the order of the index.
+# Titles of the indexes, and labels of their pages, in the order of the lists.
+INDEXES: Final = {
+    "faq": "Frequently asked questions: before the cards",
+    "switched-faq": "Frequently asked questions: from the cards on",
+}
 PAGES: Final = {
-    "faq-start": "Start",
-    "faq-answer": "Answer",
-    "faq-models": "Model",
-    "faq-solver": "Solver",
+    "faq": {
+        "faq-start": "Start",
+        "faq-files": "Files",
+        "faq-answer": "Answer",
+        "faq-times": "Times",
+        "faq-models": "Model",
+    },
+    "switched-faq": {
+        "faq-solver": "Cards",
+        "faq-run": "Switched run",
+        "faq-scripts": "Scripts",
+    },
 }
 
 _INTRODUCTION: Final = "Click a question for the reason and the exceptions."
@@ -50,7 +62,7 @@ class Question(NamedTuple):
 
 def list_questions() -> Iterator[Question]:
     """Yield the questions of all pages in order."""
-    for page in PAGES:
+    for page in list_pages():
         topic = ""
         for entry in _ENTRY.finditer((FOLDER / f"{page}.md").read_text("utf-8")):
             if entry["topic"]:
@@ -59,16 +71,19 @@ def list_questions() -> Iterator[Question]:
                 yield Question(page, topic, entry["title"], entry["answer"])
 
 
-def make_index() -> str:
-    """Return the page that lists all questions by topic."""
-    questions = [*list_questions()]
-    lines = ["# Frequently asked questions", "", _INTRODUCTION, ""]
-    for page, label in PAGES.items():
-        topics = dict.fromkeys(
-            question.topic for question in questions if question.page == page
-        )
-        links = ", ".join(f"[{topic}](#{make_anchor(topic)})" for topic in topics)
-        lines.append(f"* **{label}.** {links}")
+def list_pages() -> list[str]:
+    """List the names of all pages in order."""
+    return [page for pages in PAGES.values() for page in pages]
+
+
+def make_index(index: str) -> str:
+    """Return the page that lists the questions of an index by topic."""
+    questions = [
+        question for question in list_questions() if question.page in PAGES[index]
+    ]
+    lines = [f"# {INDEXES[index]}", "", _INTRODUCTION, ""]
+    for other in INDEXES:
+        lines += _make_menu(other, "" if other == index else f"{other}.md")
     topic = ""
     for question in questions:
         if question.topic != topic:
@@ -80,5 +95,16 @@ def make_index() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _make_menu(index: str, file: str) -> Iterator[str]:
+    """Yield a line for each page of an index, with links to its topics in ``file``."""
+    for page, label in PAGES[index].items():
+        topics = dict.fromkeys(
+            question.topic for question in list_questions() if question.page == page
+        )
+        links = ", ".join(f"[{topic}]({file}#{make_anchor(topic)})" for topic in topics)
+        yield f"* **{label}.** {links}"
+
+
 if __name__ == "__main__":
-    INDEX.write_text(make_index(), "utf-8")
+    for name in INDEXES:
+        (FOLDER / f"{name}.md").write_text(make_index(name), "utf-8")

@@ -5,7 +5,15 @@ import re
 import pytest
 
 from tests.examples import strip_blocks
-from tests.questions import FOLDER, INDEX, PAGES, Question, list_questions, make_index
+from tests.questions import (
+    FOLDER,
+    INDEXES,
+    PAGES,
+    Question,
+    list_pages,
+    list_questions,
+    make_index,
+)
 
 QUESTIONS = [*list_questions()]
 LONGEST_QUESTION = 10  # [words]
@@ -18,22 +26,25 @@ def count_words(text: str) -> int:
     return len(re.sub(r"\]\([^)]*\)", "]", text).split())
 
 
-def test_the_index_is_current() -> None:
+@pytest.mark.parametrize("index", INDEXES)
+def test_an_index_is_current(index: str) -> None:
     """Write it with ``python -m tests.questions``."""
-    assert INDEX.read_text("utf-8") == make_index()
+    assert (FOLDER / f"{index}.md").read_text("utf-8") == make_index(index)
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_the_index_lists_every_question_of_a_page(page: str) -> None:
+@pytest.mark.parametrize(
+    ("index", "page"), [(index, page) for index in INDEXES for page in PAGES[index]]
+)
+def test_an_index_lists_every_question_of_a_page(index: str, page: str) -> None:
     text = strip_blocks((FOLDER / f"{page}.md").read_text("utf-8"))
     titles = re.findall(r"^### (.+)$", text, flags=re.MULTILINE)
     listed = [question.title for question in QUESTIONS if question.page == page]
     assert titles == listed
-    assert all(f"* [{title}]({page}.md#" in make_index() for title in titles)
+    assert all(f"* [{title}]({page}.md#" in make_index(index) for title in titles)
 
 
-def test_every_page_of_questions_is_in_the_index() -> None:
-    assert {path.stem for path in FOLDER.glob("faq-*.md")} == {*PAGES}
+def test_every_page_of_questions_is_in_an_index() -> None:
+    assert {path.stem for path in FOLDER.glob("faq-*.md")} == {*list_pages()}
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,13 @@ from d2rpick.choice.parts.cost import CostModel
 from d2rpick.choice.parts.deck_of_run import warn_about_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.writing import read_driven_deck
+from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.checks import check_driven
-from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Observer
+from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal
 from d2rpick.running.engine import Commands, Solver, alone
 from d2rpick.running.inner_motion import check_wait, wait_of_deck
+from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import Limits, windows
 
 if TYPE_CHECKING:
@@ -82,9 +84,8 @@ class Driving:
             deck, parse_id_ranges("--part", part) if part else ()
         )
         self.inventory = read_inventory(deck)
-        deck_wait = wait_of_deck(self.inventory)
         if wait is not None:
-            check_wait(wait, deck_wait, deck)
+            check_wait(wait, wait_of_deck(self.inventory), deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         share = CostModel(self.inventory).saved(self.deck.parts).value
         self.limits = Limits(
@@ -95,8 +96,12 @@ class Driving:
             _UNKNOWN if share is None else 1 - share,
         )
         check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
-        self.observer = Observer(self.deck.parts, self.inventory, wait, deck_wait)
-        self.solver = Solver(folder, self.deck.name, threads)
+        selection = Selection(
+            parts=tuple(map(str, self.deck.parts)),
+            springs=tuple(map(str, sorted(self.inventory.springs))),
+        )
+        self.looks = Looks(selection, self.inventory, wait)
+        self.solver = Solver(folder, self.deck.name, self.commands)
         self.cautions: tuple[Caution, ...] = tuple(
             warn_about_solver(self.deck.parts, self.inventory)
         )
@@ -142,9 +147,8 @@ class Driving:
                     self.deck,
                     self.solver,
                     journal,
-                    self.commands,
                     self.limits,
-                    self.observer,
+                    self.looks,
                     self._told,
                 )
             except OSError as error:

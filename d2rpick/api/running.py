@@ -89,14 +89,14 @@ def first(
         of_deck.check_time("after", after, NOT_NEGATIVE),
     )
     folder = arguments.check_path("output_dir", output_dir)
-    copies = first_card(main, parse_id_ranges("parts", names), *times)
+    card, needed = first_card(main, parse_id_ranges("parts", names), *times)
     files = write_deck(
         main,
-        copies.card,
+        card,
         folder,
         overwrite=arguments.check_flag("overwrite", overwrite, False),
     )
-    return FirstRun(tuple(files), copies.wait.time, copies.wait.reason, copies.notes)
+    return FirstRun(tuple(files), needed.time, needed.reason, card.notes)
 
 
 def follow(

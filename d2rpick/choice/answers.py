@@ -316,10 +316,7 @@ class PairSuggestion(AnswerAtTd):
     @property
     def _good_pair(self) -> Pair | None:
         """The better pair, if it is clearly better than the recommended pair and its residual is good; else None."""
-        better = self.clearly_better
-        if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
-            return None
-        return better
+        return _drop_poor(self.clearly_better)
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
@@ -523,10 +520,14 @@ def find_good_pair(situation: Situation) -> Pair | None:
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
-    better = answer.better_pair
-    if better is None or better.residual is None or better.residual > POOR_RESIDUAL:
+    return _drop_poor(answer.better_pair)
+
+
+def _drop_poor(pair: Pair | None) -> Pair | None:
+    """Return a pair if its residual shows that it is not poor; otherwise None."""
+    if pair is None or pair.residual is None or pair.residual > POOR_RESIDUAL:
         return None
-    return better
+    return pair
 
 
 def _is_level_refused(situation: Situation) -> bool:

@@ -14,7 +14,8 @@ from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import find_largest
-from d2rpick.flight.work import FEWEST_STATES, compute_work_beyond_gravity
+from d2rpick.flight.window import FEWEST_STATES_OF_WORK, LAST_DIGIT
+from d2rpick.flight.work import compute_work_beyond_gravity
 from d2rpick.histories.history import LARGEST_ENERGY
 from d2rpick.histories.samples import find_window as within
 
@@ -36,10 +37,8 @@ MOST_IMBALANCE = 0.10
 # MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a fraction of the peak internal energy [-].
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# _TINY_SHARE: largest internal energy treated as a rounding error, as a fraction of the run's largest energy [-].
-# _TINY_SHARE follows from the precision of the files: single precision and glstat have six to seven digits.
-# _FLOOR: largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
-_TINY_SHARE, _FLOOR = 1e-6, 1e-15
+# Largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
+_FLOOR: Final = 1e-15
 # Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01
 # Smallest reference energy at which the energy ratio is used, as a fraction of the peak of the reference energy [-].
@@ -140,9 +139,9 @@ def _explain_few_states(balance: Balance, window: tuple[float, float]) -> str | 
     states = int(
         np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
     )
-    if balance.external_work is None or states >= FEWEST_STATES:
+    if balance.external_work is None or states >= FEWEST_STATES_OF_WORK:
         return None
-    return f"the window holds {states} states: at least {FEWEST_STATES} are needed to tell a load from gravity"
+    return f"the window holds {states} states: at least {FEWEST_STATES_OF_WORK} are needed to tell a load from gravity"
 
 
 def warn_about_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
@@ -232,7 +231,7 @@ def _find_peak(balance: Balance) -> float | None:
         balance.internal, balance.kinetic, balance.total, balance.external_work
     )
     peak = float(balance.internal.max())
-    return peak if peak > max(_FLOOR, _TINY_SHARE * highest) else None
+    return peak if peak > max(_FLOOR, LAST_DIGIT * highest) else None
 
 
 def _compute_share(energy: Samples | None, peak: float | None) -> float | None:

@@ -110,8 +110,8 @@ class ChoiceOptions:
         metadata=_describe_use(of_cards=True),
     )
     margin: float | None = make_option(
-        "Time kept free after the load and before the next contact.  [default: 0; derived if d2rpick chooses "
-        "td, or with `landing`]",
+        "Time kept free after the load and before the next contact.  [default: 0; before the contact it is "
+        "derived if d2rpick chooses td, or with `landing`]",
         NOT_NEGATIVE,
         "T",
         metadata=_describe_use(of_cards=True),

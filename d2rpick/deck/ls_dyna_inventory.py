@@ -19,6 +19,7 @@ from d2rpick.deck.ls_dyna_columns import (
     make_watched_line,
 )
 from d2rpick.deck.ls_dyna_parts import (
+    OPTIONS_WITHOUT_IDS,
     DeckParts,
     SectionCard,
     name_material,
@@ -43,34 +44,10 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that d2rpick can read, because they add no integers in the id columns.
-_OPTIONS: Final = {
-    *(
-        "THICKNESS",
-        "BETA",
-        "MCID",
-        "OFFSET",
-        "ORTHO",
-        "ORIENTATION",
-        "COMPOSITE",
-        "LONG",
-        "SCALAR",
-        "SCALR",
-    ),
-    *(
-        "SECTION",
-        "ELFORM",
-        "DOF",
-        "PID",
-        "WARPAGE",
-        "ELBOW",
-        "ID",
-        "TITLE",
-        "SHL4",
-        "TO",
-        "SHL8",
-        "TET4TOTET10",
-    ),
+# Options of element keywords that d2rpick can read.
+_OPTIONS: Final = OPTIONS_WITHOUT_IDS | {
+    *("SCALR", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE"),
+    *("SHL4", "TO", "SHL8", "TET4TOTET10"),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
 # Keywords that define no elements and do not change the mass or the cost of a part.

@@ -74,19 +74,18 @@ _LINES: Final = {
     "TSHELL": 2,
 }
 _SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
-_ELEMENT_OPTIONS: Final = {  # Options whose lines have no integers in the id columns.
-    *(
-        "THICKNESS",
-        "BETA",
-        "MCID",
-        "OFFSET",
-        "ORTHO",
-        "ORIENTATION",
-        "COMPOSITE",
-        "LONG",
-        "SCALAR",
-        "SECTION",
-    ),
+# Options of element keywords whose additional lines have no integers in the id columns.
+OPTIONS_WITHOUT_IDS: Final = {
+    "THICKNESS",
+    "BETA",
+    "MCID",
+    "OFFSET",
+    "ORTHO",
+    "ORIENTATION",
+    "COMPOSITE",
+    "LONG",
+    "SCALAR",
+    "SECTION",
     "ELFORM",
 }
 
@@ -106,10 +105,8 @@ _ABLE: Final = (
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
-_MOST_ROWS = (
-    # Largest number of lines of one contact or wall without an id; more lines may define a second one.
-    8
-)
+# Largest number of lines of one contact or wall without an id; more lines may define a second one.
+_MOST_ROWS: Final = 8
 
 
 class DeckPartSet(NamedTuple):
@@ -412,7 +409,7 @@ def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
     return [
         card
         for card in cards
-        if searched == (set(card.name.split("_")[2:]) <= _ELEMENT_OPTIONS)
+        if searched == (set(card.name.split("_")[2:]) <= OPTIONS_WITHOUT_IDS)
     ]
 
 

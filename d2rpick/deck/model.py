@@ -34,6 +34,7 @@ _LAYERS: Final = 3
 SPRING: Final = "spring"
 # Element kinds that stay deformable when their part is made rigid.
 DISCRETE: Final = frozenset({SPRING, "seatbelt"})
+_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
 
 class Hold(NamedTuple):
@@ -188,9 +189,6 @@ class Material(NamedTuple):
     poisson: float | None = None
 
 
-_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
-
-
 class Section(NamedTuple):
     """Section of a part: formulation of each element kind, shell thickness, beam area, spring properties.
 
@@ -273,6 +271,15 @@ class Inventory:
     flaws: tuple[Flaw, ...] = ()
     boundary: Boundary = NO_BOUNDARY
     left_rigid: LeftRigid | None = None
+
+    @property
+    def rigid_parts(self) -> set[int]:
+        """Ids of the parts whose material is rigid from the start."""
+        return {
+            part
+            for part, data in self.parts.items()
+            if data.material and data.material.kind == "rigid"
+        }
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

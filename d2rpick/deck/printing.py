@@ -165,11 +165,12 @@ def _print_ls_dyna_contact(
     kind, number, pushes = _find_force(printing)
     free, forced = _CODES[kind]
     timing = find_pair_timing(windows, pushes)
-    first, second = printing.swset
-    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
+    part_sets = number_sets(
+        (ids, *group_by_lead(ids, printing).values()), printing.swset[0]
+    )
     cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
-    waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
-    returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
+    waits = Waiting(free, number, latest=timing.latest)
+    returns = Waiting(forced, number, timing.wait, offset=timing.offset)
     spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
     comment_lines = (
         *write_comments(

@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_sensors import Forces, Spans
 
     Contacts = Callable[[Collection[int]], Spans | None]
+# Number of lines of /BEGIN: the name of the run, the version, and two lines of units.
+_LINES_OF_BEGIN: Final = 4
 
 
 @dataclass(eq=False, repr=False)
@@ -94,10 +96,6 @@ class RadiossRun:
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
-
-
-# Number of lines of /BEGIN: the run name, the version, and two lines of units.
-_LINES_OF_BEGIN: Final = 4
 
 
 def read_run(path: str, content: bytes | None = None) -> RadiossRun:

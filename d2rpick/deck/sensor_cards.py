@@ -29,7 +29,7 @@ def write_force_sensor(number: int, kind: str, entity: int, wait: float) -> str:
     return f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{delay}\n{force}\n"
 
 
-def write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) -> str:
+def _write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) -> str:
     """Return the card of an OR, AND or NOT sensor whose inputs are one or two other sensors."""
     names = ("sens_ID1", "sens_ID2")[: len(inputs)]
     row = SENSOR_INPUTS.write(**dict(zip(names, inputs, strict=True)))
@@ -41,6 +41,40 @@ def write_any_of(numbers: Sequence[int], title: str) -> tuple[str, int]:
     texts: list[str] = []
     last, *others = numbers
     for number, other in enumerate(others, start=numbers[-1] + 1):
-        texts.append(write_sensor_of_sensors("OR", number, title, last, other))
+        texts.append(_write_sensor_of_sensors("OR", number, title, last, other))
         last = number
     return "".join(texts), last
+
+
+def write_flight_sensors(
+    contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
+) -> tuple[str, int, int]:
+    """Write sensors that detect a contact and a flight; their ids begin with ``first_id``.
+
+    Parameters
+    ----------
+    contacts : sequence of (str, int)
+        Kind and id of each contact and rigid wall, as `write_force_sensor` takes them.
+    wait, first_switch : float
+        Force-free time that shows a flight, and the earliest time at which a flight is detected [time].
+
+    Returns
+    -------
+    (str, int, int)
+        The cards, the id of the sensor that is active during a contact and for the ``wait`` after it, and the id of the
+        sensor that is active in a flight.
+    """
+    cards = [
+        write_force_sensor(number, *contact, wait)
+        for number, contact in enumerate(contacts, start=first_id)
+    ]
+    ids = range(first_id, first_id + len(contacts))
+    combined, any_force = write_any_of(ids, "any force")
+    no_force, late_enough, flight = range(any_force + 1, any_force + 4)
+    cards += [
+        combined,
+        _write_sensor_of_sensors("NOT", no_force, "no force", any_force),
+        write_time_sensor(late_enough, "from then on", first_switch),
+        _write_sensor_of_sensors("AND", flight, "flight", no_force, late_enough),
+    ]
+    return "".join(cards), any_force, flight

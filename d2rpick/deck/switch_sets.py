@@ -63,7 +63,7 @@ def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """Conditions of a switch set: CODE, the contact, TIME3 [time], the id of the paired set (``other``), and PAIRED.
+    """Conditions of a switch set: CODE, the contact, and TIME3 [time].
 
     ``latest``: TIME2, the last time at which it switches [time]. ``offset``: the gap before a contact at which it
     switches. 0 stands for none.
@@ -72,8 +72,6 @@ class Waiting(NamedTuple):
     code: int = 0
     contact: int = 0
     delay: float = 0.0
-    other: int = 0
-    paired: int = 0
     latest: float = 0.0
     offset: float = 0.0
 
@@ -83,15 +81,17 @@ def write_header(
     time: str,
     step_cap: str,
     counts: tuple[int, int],
-    waits: Waiting | None = None,
+    waiting: Waiting,
+    pair: tuple[int, int],
     constraints: Sequence[int] = (0, 0),
 ) -> Iterator[str]:
     """Yield the header lines of a switch set; TIME1 is ``time``, or the earliest time for a set that needs a force.
 
-    ``counts`` are D2R and R2D. ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
+    ``pair`` are the id of the other set and PAIRED, used if the set waits.  ``counts`` are D2R and R2D.
+    ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
     them.
     """
-    waiting = waits or Waiting()
+    other, paired = pair if waiting.code else (0, 0)
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     yield SWITCH_TIMES.write_names()
     yield SWITCH_TIMES.write(
@@ -101,8 +101,8 @@ def write_header(
         TIME2=write_number(waiting.latest),
         TIME3=write_number(waiting.delay),
         ENTNO=waiting.contact,
-        RELSW=waiting.other,
-        PAIRED=waiting.paired,
+        RELSW=other,
+        PAIRED=paired,
     )
     yield SWITCH_COUNTS.write_names()
     nrbf, ncsf = constraints
@@ -136,7 +136,12 @@ def write_set_pair(
     deleted = [flag * _DELETE for flag in is_deleted]
     activated = [flag * _ACTIVATE for flag in is_deleted]
     counts = (len(rigid_lines) - 1, 0), (0, len(deformable_lines) - 1)
-    yield from write_header(sets[0], times[0], step_cap, counts[0], waits[0], deleted)
+    first, second = sets
+    yield from write_header(
+        first, times[0], step_cap, counts[0], waits[0], (second, 1), deleted
+    )
     yield from rigid_lines
-    yield from write_header(sets[1], times[1], "0.0", counts[1], waits[1], activated)
+    yield from write_header(
+        second, times[1], "0.0", counts[1], waits[1], (first, -1), activated
+    )
     yield from deformable_lines

@@ -26,3 +26,16 @@ place error e over the closing speed v added to the amplitude of the vibration o
 at tr; `vibrating` which parts vibrate together, and with what kinetic energy; `contact_times` when a force other than
 gravity acts.
 """
+
+from typing import Final
+
+# Names of the data that can show a flight, with the most reliable first.
+SOURCES: Final = (
+    "given",
+    "momentum",
+    "contact-force",
+    "contact-energy",
+    "energy-balance",
+    "oscillator",
+    "energy",
+)

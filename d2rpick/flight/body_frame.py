@@ -153,7 +153,8 @@ def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
     if sum(across) <= _ALONG_LINE * along:
         return np.inf
     deviation = np.einsum("p,npi->", mass, (places - shape) ** 2)
-    return float(np.sqrt(deviation / (len(places) * mass.sum() * sum(across))))
+    all_masses = len(places) * mass.sum()
+    return float(np.sqrt(deviation / (all_masses * sum(across))))
 
 
 def compute_second_moments(places: Samples, mass: Samples) -> Samples:

@@ -141,11 +141,11 @@ def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, fl
     """
     start = float(time[first])
     end = float(time[stop])
-    most = _OF_ONE_INTERVAL * (end - start)
+    longest_delay = _OF_ONE_INTERVAL * (end - start)
     later = float(time[first + 1] - start) / 2
     earlier = float(end - time[stop - 1]) / 2
-    begins = start if first == 0 else start + min(later, most)
-    ends = end if stop == time.size - 1 else end - min(earlier, most)
+    begins = start if first == 0 else start + min(later, longest_delay)
+    ends = end if stop == time.size - 1 else end - min(earlier, longest_delay)
     return begins, ends
 
 

@@ -30,17 +30,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Names of the data that can show a flight, with the most reliable first.
-SOURCES: Final = (
-    "given",
-    "momentum",
-    "contact-force",
-    "contact-energy",
-    "energy-balance",
-    "oscillator",
-    "energy",
-    None,
-)
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, as a fraction of their internal energy [-].

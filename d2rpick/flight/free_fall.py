@@ -13,6 +13,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.flight.window import (
     FEWEST,
+    FEWEST_STATES_OF_WORK,
     ROUND_OFF,
     TOLERANCE,
     Constant,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 # _GRAVITY: gravity in m, inches and feet per second squared; in other units, it differs by a power of 10.
 # _ALIKE: largest relative deviation of an acceleration that is treated as gravity [-]; 1 load in 200 lies within it.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
+# Usual values of gravity in decks, in m, inches and feet per second squared, up to a power of 10.
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 # Ratio of the rounding error of the fitted momentum change to the rounding error of the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
@@ -64,8 +66,6 @@ _UNSEEN = 2.0
 _OF_WORK = 2e-3
 # Smallest relative excess of a mass written by the solver over the lower bound from momenta and energies [-].
 _CLEARLY_HEAVIER = 1e-6
-# Smallest number of states for a fit of work; it is twice the number of unknowns.
-_LEAST_STATES = 6
 
 
 class Laws:
@@ -207,13 +207,14 @@ class Laws:
         ):
             return
         slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
-        for axis, is_seen in zip(np.eye(along.size), across, strict=True):
-            if is_seen @ is_seen > _SEEN**2:
-                size = float(slope @ is_seen) / float(is_seen @ is_seen)
-                if np.linalg.norm(slope - size * is_seen) <= _ALIKE * abs(
-                    size
-                ) and self._is_gravity(abs(size) / self.mass):
-                    yield size * axis
+        for axis, seen_part in zip(np.eye(along.size), across, strict=True):
+            if seen_part @ seen_part <= _SEEN**2:
+                continue
+            size = float(slope @ seen_part) / float(seen_part @ seen_part)
+            left_over = np.linalg.norm(slope - size * seen_part)
+            is_along_axis = left_over <= _ALIKE * abs(size)
+            if is_along_axis and self._is_gravity(abs(size) / self.mass):
+                yield size * axis
 
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
         """Yield the usual weights (3,) that are close to the mean force between two states."""
@@ -238,11 +239,10 @@ class Laws:
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
-        remaining_force = (
-            np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis]
-            - weight
-        )
-        first, _, last = np.linalg.norm(remaining_force, axis=1)
+        # Mean force in each third of the window.
+        steps = np.diff(time)[:, np.newaxis]
+        force = np.diff(self.fit.momentum[at], axis=0) / steps
+        first, _, last = np.linalg.norm(force - weight, axis=1)
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
@@ -419,7 +419,7 @@ def find_acceleration_by_work(
     """
     work = balance.kinetic_and_internal if balance.worked is None else balance.worked
     inside = find_window(balance.time, start, end)
-    if work is None or balance.time[inside].size < _LEAST_STATES:
+    if work is None or balance.time[inside].size < FEWEST_STATES_OF_WORK:
         return None
     impulse = integrate_by_trapezia(
         balance.time[inside], np.interp(balance.time[inside], time, momentum)
@@ -444,9 +444,8 @@ class FreeFall(Law):
         super().__init__(time)
         self.momentum = momentum
         self.integral = integrate_by_trapezia(time, momentum)
-        self._both = np.asfortranarray(
-            np.hstack([momentum, self.integral])
-        )  # Columns that are contiguous in memory are faster to process.
+        # Columns that are contiguous in memory are faster to process.
+        self._both = np.asfortranarray(np.hstack([momentum, self.integral]))
 
     def _misfit(self, first: int, last: int) -> float:
         if (

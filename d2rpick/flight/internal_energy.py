@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.flight.window import FEWEST, SHORTEST
+from d2rpick.flight.window import FEWEST, LAST_DIGIT, SHORTEST
 from d2rpick.histories.samples import find_crossings, find_window
 
 if TYPE_CHECKING:
@@ -40,9 +40,6 @@ _LEVEL: Final = 1 / 8
 # _TURNED: smallest number of energy extrema in the time with which a landing is compared.
 _KNOWN, _TURNED = 3 / 4, 4
 
-
-# Largest energy that is treated as round-off, relative to the largest energy [-]; files have about seven digits.
-_ROUND_OFF: Final = 1e-6
 
 # Widening of the energy band of a flight's last quarter such that it contains all its energies, in band widths [-].
 _RESERVE: Final = 0.5
@@ -254,7 +251,7 @@ def round_off(history: History) -> float:
     if balance:
         terms += [balance.internal, balance.kinetic]
         terms += [balance.external_work, balance.total]
-    return _ROUND_OFF * find_largest(history.energy, *terms)
+    return LAST_DIGIT * find_largest(history.energy, *terms)
 
 
 def find_largest(*terms: Samples | None) -> float:
@@ -292,7 +289,7 @@ def find_settled_time(
         swings then do not show a free vibration.
     """
     inside = find_window(time, start, end)
-    rounding = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
+    rounding = LAST_DIGIT * float(np.abs(energy).max(initial=0.0))
     first = inside.start
     last = inside.stop
     while last - first >= FEWEST:
@@ -400,7 +397,9 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
     # Near the end of a fall, the sum of energies is larger than in its last quarter, although damping takes nothing.
     taken = 0.0 if np.isinf(lost[0]) else float(lost[0])
     drift = float(second_half.mean() - first_half.mean())
-    if abs(drift) > _DRIFT * _ALIKE * width + (taken if drift < 0 else 0.0):
+    # What is taken from the energy explains a fall, but no rise.
+    explained = taken if drift < 0 else 0.0
+    if abs(drift) > _DRIFT * _ALIKE * width + explained:
         return False
     if min(np.ptp(first_half), np.ptp(second_half)) < _ALIKE * width - taken:
         return False

@@ -364,9 +364,10 @@ def compute_closing_speed(history: History, flight: Flight) -> float | None:
 def _compute_share_towards_ground(momentum: Samples) -> float:
     """Return the fraction of the final kinetic energy that belongs to motion along gravity [-]."""
     direction = _find_direction_of_change(momentum)
-    if direction is None or not momentum[-1].any():
+    last = momentum[-1]
+    if direction is None or not last.any():
         return 0.0 if momentum.any() else 1.0
-    return float(momentum[-1] @ direction) ** 2 / float(momentum[-1] @ momentum[-1])
+    return float(last @ direction) ** 2 / float(last @ last)
 
 
 def _find_direction_of_change(momentum: Samples) -> Samples | None:

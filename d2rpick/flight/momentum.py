@@ -16,7 +16,9 @@ from d2rpick.base.memory import remember
 from d2rpick.flight.free_fall import Laws
 from d2rpick.flight.window import (
     FEWEST,
+    LAST_DIGIT,
     TOLERANCE,
+    VISIBLE,
     FreeFlight,
     find_all_windows,
     find_lasting_window,
@@ -35,10 +37,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest relative change of a constant momentum [-]; single precision has seven digits.
-_CONSTANT = 1e-6
-# Smallest ratio of a momentum, or of its change, to its rounding error at which it shows motion [-].
-_VISIBLE = 100
 # Smallest ratio of window lengths at which a larger set of parts is preferred [-].
 # A part with a large momentum, such as a sled, increases the tolerance and the window lengths of all parts.
 _LONGER = 1.1
@@ -183,7 +181,7 @@ def find_flight_of(
     noise = momenta.noise(members)
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
     gravities = momenta.surroundings.gravity_on(parts)
-    if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
+    if extent <= max(2 * noise, LAST_DIGIT * float(np.abs(momentum).max())):
         is_flight = float(np.abs(momentum).max()) > noise and _has_clear_motion(
             momenta, members, noise
         )
@@ -208,7 +206,7 @@ def find_flight_of(
         float(np.abs(inside[inside.shape[0] // 2 :]).max())
         <= _HELD * float(np.abs(momentum).max()) + noise
     ):
-        steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
+        steady = VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
             return None  # The parts are held by supports, or they are at rest.
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
@@ -255,7 +253,7 @@ def find_all_flights(
 def can_deny_flight(momenta: Momenta) -> bool:
     """Return True if the chosen parts or the model move enough for their momentum to exclude a flight."""
     change = momenta.change(momenta.chosen)
-    return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(
+    return momenta.time.size >= FEWEST and change > VISIBLE * momenta.noise(
         momenta.chosen
     )
 
@@ -272,7 +270,7 @@ def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) ->
         size = change
     else:
         size = float(np.abs(momenta.values[:, list(parts)]).max())
-    return size > _VISIBLE * noise
+    return size > VISIBLE * noise
 
 
 def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:

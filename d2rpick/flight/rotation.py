@@ -29,8 +29,8 @@ _MOST_STEPS: Final = 25
 # _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Smallest squared lever arms about an axis whose rotation can be found, as a fraction of those about the others [-].
-_ALONG_AXIS: Final = 1e-6
+# Sums of m r^2, about an axis or unexplained by a rotation, are treated as zero below this fraction of another [-].
+_VANISHING: Final = 1e-6
 # Numbers of periods per record that are tried as start values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
@@ -38,8 +38,6 @@ _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(
 _TRIED: Final = 2
 # Largest ratio to which omitting the next moving part reduces the unexplained displacement [-].
 _MORE_RIGID: Final = 0.5
-# Largest unexplained sum of m r^2 that is ignored, as a fraction of the sum of m r^2 [-].
-_NOTHING: Final = 1e-6
 # Largest motion of the other parts in a rotation that is ignored, relative to the moving part's motion [-].
 _NOTABLE_WAY: Final = 0.1
 # Largest mass fraction of a single part at which the rotation of the body can be determined [-].
@@ -79,7 +77,7 @@ def _fit_steady_rotation(
         term.sum(axis=0) for term in _list_linear_terms(time, ways, masses)
     )
     rate = np.asarray(
-        np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right_side
+        np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True) @ right_side
     )
     misfit = _compute_rest(time, ways, rate, weights)
     small = _SMALL * 2 * np.pi / float(time[-1] - time[0])
@@ -125,7 +123,7 @@ def subtract_circles(time: Samples, ways: Samples, rate: Samples) -> Samples:
     turned = turned - turned.mean(axis=0)
     normal = np.tensordot(frame, frame, axes=((0, 2), (0, 2)))
     right_side = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
-    arms = right_side @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
+    arms = right_side @ np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True)
     return np.asarray(turned - arms @ frame)
 
 
@@ -158,7 +156,7 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
             np.sum(
                 (
                     wanted
-                    - columns @ np.linalg.lstsq(columns, wanted, rcond=_ALONG_AXIS)[0]
+                    - columns @ np.linalg.lstsq(columns, wanted, rcond=_VANISHING)[0]
                 )
                 ** 2
             )
@@ -190,7 +188,7 @@ def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samp
     )
     solved = np.einsum(
         "pij,pj->pi",
-        np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True),
+        np.linalg.pinv(normal, rcond=_VANISHING, hermitian=True),
         right_side,
     )
     return np.asarray(square - np.einsum("pi,pi->p", right_side, solved))
@@ -231,12 +229,12 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
-    across = np.array(
-        [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-    )  # The product ``across @ v`` is the cross product of the axis and v.
-    return np.asarray(
-        np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
-    )
+    # The product ``across @ v`` is the cross product of the axis and v.
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Rodrigues' formula.
+    odd = np.sin(angle) * across
+    even = (1 - np.cos(angle)) * (across @ across)
+    return np.asarray(np.eye(3) + odd + even)
 
 
 def find_moving_parts(
@@ -291,7 +289,7 @@ def _find_next_moving_part(
         _leave_part_out(time, ways, mass, left, part)
         for part in dict.fromkeys(chain(*may))
     ]
-    nothing = _NOTHING * float(
+    nothing = _VANISHING * float(
         np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2)
     )
     least_misfit = min((trial.rest for trial in trials), default=0.0) + nothing

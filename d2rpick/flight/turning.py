@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.geometry import Placement
-    from d2rpick.flight.body_frame import Displacements
+    from d2rpick.flight.body_frame import Displacements, Frame
     from d2rpick.histories.history import Momenta, Samples
 
 # Largest number of states in the integration, which suffices because vibration hardly rotates a body.
@@ -133,6 +133,45 @@ class Flying(NamedTuple):
     others: Collection[int] = ()
 
 
+class _FlyingParts(NamedTuple):
+    """Flying parts whose mass and place in the deck are known.
+
+    ``columns`` are their columns in the momenta; ``masses`` (parts,), ``centres`` (parts, 3) [length] and ``spreads``
+    (parts, 3, 3), the second moments of a unit mass about the centre [length^2], have the same order.
+    """
+
+    columns: list[int]
+    masses: Samples
+    centres: Samples
+    spreads: Samples
+
+    def find_rows(self, columns: Sequence[int]) -> list[int]:
+        """Return the positions of columns of the momenta in the arrays of these parts."""
+        rows = {column: row for row, column in enumerate(self.columns)}
+        return [rows[column] for column in columns]
+
+
+class _Motion(NamedTuple):
+    """Motion of the flying parts at times ``time`` (n,): the ``frame`` of the body, and ``places`` (n, parts, 3) in it.
+
+    The places are relative to the centre of mass of all that flies [length].
+    """
+
+    time: Samples
+    frame: Frame
+    places: Samples
+
+
+class _Rotor(NamedTuple):
+    """What rotates, in the frame of the body: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) from state to state.
+
+    The spin is the angular momentum in this frame, integrated over each step.
+    """
+
+    inertia: Samples
+    spin: Samples
+
+
 def follow_turning(
     seen: Flying,
     moving: Sequence[int],
@@ -145,77 +184,114 @@ def follow_turning(
     neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.
     """
     momenta = seen.momenta
-    masses = seen.masses
     assert momenta.parts is not None
-    all_members = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
-    placed = {i: placement.parts.get(momenta.parts[i].id) for i in all_members}
-    placed_parts = [part_place for part_place in placed.values() if part_place]
-    mass = masses[all_members]
-    if len(placed_parts) < len(all_members) or not np.isfinite(mass).all():
+    flying = _locate_flying_parts(seen, placement)
+    if flying is None:
         return None
+    masses = flying.masses
+    frame_columns = choose_frame_parts(
+        seen.members, moving, momenta.parts, seen.masses, placement
+    )
+    motion = _follow_parts(seen, flying, frame_columns, placement, displacements)
+    if motion is None:
+        return None
+    time, frame, places = motion
+
+    own_inertia = compute_inertia(np.einsum("p,pij->ij", masses, flying.spreads))
+    point_inertia = compute_inertia(compute_second_moments(places, masses))
+    everything = _Rotor(point_inertia + own_inertia, _integrate_spin(places, masses))
+    rigid_rows = flying.find_rows(seen.members)
+    rigid_places, rigid_masses = places[:, rigid_rows], masses[rigid_rows]
+    rigid = _Rotor(
+        compute_inertia(compute_second_moments(rigid_places, rigid_masses)),
+        _integrate_spin(rigid_places, rigid_masses),
+    )
+    carried, pushed, kept = _solve_turning(time, frame.axes, everything, rigid)
+
+    # The centre of the parts that define the frame, in the frame and in the deck.
+    frame_rows = flying.find_rows(frame_columns)
+    frame_centre = _weigh_by_mass(places[:, frame_rows], masses[frame_rows])
+    deck_centre = _weigh_by_mass(flying.centres[frame_rows], masses[frame_rows])
+    mass_times_shift = np.einsum(
+        "p,npi->ni", rigid_masses, rigid_places - frame_centre[:, np.newaxis]
+    )
+    arm = frame_centre
+    watched_centre = placement.watched_centre(
+        momenta.parts[column].id for column in frame_columns
+    )
+    if watched_centre is not None:
+        arm = frame_centre + (watched_centre - deck_centre)
+    nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
+    nodes_at_end = (nodes - deck_centre + frame_centre[-1]) @ frame.axes[-1].T
+    return Turning(
+        time=time,
+        place=mass_times_shift / masses.sum(),
+        arm=arm,
+        inertia=rigid.inertia,
+        carried=carried,
+        pushed=pushed,
+        kept=kept,
+        doubt=frame.doubt,
+        nodes=nodes_at_end,
+        frame=frame.axes[-1],
+        rate=_compute_last_rate(time, frame.axes),
+    )
+
+
+def _follow_parts(
+    seen: Flying,
+    flying: _FlyingParts,
+    frame_columns: Sequence[int],
+    placement: Placement,
+    displacements: Displacements | None,
+) -> _Motion | None:
+    """Follow the frame of the body and the flying parts in it; None if nothing determines the frame."""
+    momenta = seen.momenta
+    assert momenta.parts is not None
+    frame_ids = [momenta.parts[column].id for column in frame_columns]
+    frame_rows = flying.find_rows(frame_columns)
+    masses = flying.masses
     inside = find_window(momenta.time, seen.start, seen.end)
     stride = -(-(inside.stop - inside.start) // _STATES)
     time = momenta.time[inside][::stride]
-    centre = np.stack([part_place.centre for part_place in placed_parts])
-    since = _integrate_velocities(momenta, all_members, mass)[inside][::stride]
-    body = choose_frame_parts(seen.members, moving, momenta.parts, masses, placement)
-    at = {i: place for place, i in enumerate(all_members)}
-    rigid = [at[i] for i in seen.members]
-    part = [at[i] for i in body]
-    home = _weigh_by_mass(centre[part], mass[part])
-    where = None
+    travel = _integrate_velocities(momenta, flying.columns, masses)[inside][::stride]
+
+    # If the record begins with the run, the parts have moved by their travel from where the deck puts them.
     frame = None
-    if momenta.time[0] <= momenta.time[1] - momenta.time[0]:
-        where = centre + since
-        frame = fit_frame(centre[part], where[:, part], mass[part])
+    begins_with_run = momenta.time[0] <= momenta.time[1] - momenta.time[0]
+    positions = flying.centres + travel
+    if begins_with_run:
+        frame = fit_frame(
+            flying.centres[frame_rows], positions[:, frame_rows], masses[frame_rows]
+        )
     if frame is None and displacements is not None:
-        ids = [momenta.parts[i].id for i in body]
-        frame = find_frame_of_nodes(ids, placement, displacements, time)
+        frame = find_frame_of_nodes(frame_ids, placement, displacements, time)
     if frame is None:
         return None
-    if where is None:
-        where = _place_by_frames(centre, since, frame.axes)
-    frames = frame.axes
-    places = (where - _weigh_by_mass(where, mass)[:, np.newaxis]) @ frames
-    middle = _weigh_by_mass(places[:, part], mass[part])
-    own_inertia = compute_inertia(
-        np.einsum(
-            "p,pij->ij",
-            mass,
-            np.stack([part_place.spread for part_place in placed_parts]),
-        )
+    if not begins_with_run:
+        positions = _place_by_frames(flying.centres, travel, frame.axes)
+    centre_of_mass = _weigh_by_mass(positions, masses)
+    places = (positions - centre_of_mass[:, np.newaxis]) @ frame.axes
+    return _Motion(time, frame, places)
+
+
+def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | None:
+    """Look up the parts with a mass in the deck; None if a mass is unknown, or a part is not in the deck."""
+    momenta = seen.momenta
+    assert momenta.parts is not None
+    columns = sorted(
+        column for column in {*seen.others, *seen.members} if seen.masses[column] != 0
     )
-    inertia = compute_inertia(compute_second_moments(places, mass)) + own_inertia
-    spin = _integrate_spin(places, mass)
-    moving_inertia = compute_inertia(
-        compute_second_moments(places[:, rigid], mass[rigid])
-    )
-    solved = _solve_turning(
-        time,
-        frames,
-        (inertia, spin),
-        (moving_inertia, _integrate_spin(places[:, rigid], mass[rigid])),
-    )
-    column = (
-        np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis])
-        / mass.sum()
-    )
-    looked_at = placement.watched_centre(
-        momenta.parts[i].id for i in body
-    )  # Centre of the parts according to the deck [length].
-    arm = middle + (0.0 if looked_at is None else looked_at - home)
-    nodes = placement.find_nodes([momenta.parts[i].id for i in seen.members])
-    nodes = (nodes - home + middle[-1]) @ frames[-1].T
-    return Turning(
-        time,
-        column,
-        arm,
-        moving_inertia,
-        *solved,
-        frame.doubt,
-        nodes,
-        frames[-1],
-        _compute_last_rate(time, frames),
+    part_places = [placement.parts.get(momenta.parts[column].id) for column in columns]
+    known_places = [part_place for part_place in part_places if part_place]
+    masses = seen.masses[columns]
+    if len(known_places) < len(columns) or not np.isfinite(masses).all():
+        return None
+    return _FlyingParts(
+        columns,
+        masses,
+        np.stack([part_place.centre for part_place in known_places]),
+        np.stack([part_place.spread for part_place in known_places]),
     )
 
 
@@ -250,43 +326,44 @@ def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
 
 
 def _solve_turning(
-    time: Samples,
-    frames: Samples,
-    whole: tuple[Samples, Samples],
-    moving: tuple[Samples, Samples],
+    time: Samples, frames: Samples, everything: _Rotor, rigid: _Rotor
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect."""
-    (inertia, spin), steps = whole, np.diff(time)
-    swept = (
-        np.einsum("nij,nj->ni", _take_middle_values(inertia), _compute_turns(frames))
-        + spin
+    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect.
+
+    ``frames`` (n, 3, 3) are those of the body, ``everything`` is all that flies and ``rigid`` the parts that become
+    rigid.
+    """
+    steps = np.diff(time)[:, np.newaxis]
+    # The angular momentum is constant in the fixed frame of reference; it is the mean of I w + h over the flight.
+    turned = np.einsum(
+        "nij,nj->ni",
+        _take_middle_values(everything.inertia),
+        _compute_turns(frames),
     )
-    kept_rate = (
+    swept = turned + everything.spin
+    fixed_momentum = (
         np.einsum("nij,nj->i", _take_middle_values(frames), swept) / steps.sum()
-    )  # Angular momentum in the fixed frame of reference.
-    # Angular momentum in the frame of the body.
-    momentum = kept_rate @ frames
-    light = np.linalg.inv(inertia.mean(axis=0))
-    rate = momentum @ light
-    carried = _integrate_matrix(
-        time, light @ _make_cross_matrices(momentum) - _make_cross_matrices(rate)
     )
-    back = (
-        _take_middle_values(np.asarray(np.linalg.inv(carried), dtype=np.float64))
-        @ light
-    )
+    momentum = fixed_momentum @ frames
+    inverse_inertia = np.linalg.inv(everything.inertia.mean(axis=0))
+    rate = momentum @ inverse_inertia
+
+    # Homogeneous equation: dpsi/dt = I^-1 (L x psi) - w x psi.
+    slope = inverse_inertia @ _make_cross_matrices(momentum)
+    slope = slope - _make_cross_matrices(rate)
+    carried = _integrate_matrix(time, slope)
+
+    # Variation of constants: the right-hand side is carried back to the first state.
+    carried_back = np.asarray(np.linalg.inv(carried), dtype=np.float64)
+    back = _take_middle_values(carried_back) @ inverse_inertia
+    rate_times_step = _take_middle_values(rate) * steps
+    rigid_inertia = _take_middle_values(rigid.inertia)
     dragged = (
-        np.einsum(
-            "nij,nj->ni", _take_middle_values(moving[0]), _take_middle_values(rate)
-        )
-        * steps[:, np.newaxis]
-        + moving[1]
+        np.einsum("nij,nj->ni", rigid_inertia, _take_middle_values(rate)) * steps
+        + rigid.spin
     )
     pushed = np.einsum("nij,nj->ni", back, dragged)
-    per_inertia = (
-        back[..., np.newaxis]
-        * (_take_middle_values(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
-    )
+    per_inertia = back[..., np.newaxis] * rate_times_step[:, np.newaxis, np.newaxis]
     return carried, _sum_running(pushed), _sum_running(per_inertia)
 
 
@@ -302,17 +379,14 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 def _compute_turns(frames: Samples) -> Samples:
     """Return the rotation from each frame to the next, shape (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
+    # The odd part of a rotation matrix holds its axis times the sine of its angle.
     odd = (between - between.transpose(0, 2, 1)) / 2
     sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
     size = np.linalg.norm(sine, axis=1, keepdims=True)
-    return np.asarray(
-        sine
-        * np.where(
-            size > 0,
-            np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0),
-            1.0,
-        )
-    )
+    is_turned = size > 0
+    angle = np.arcsin(np.minimum(size, 1.0))
+    angle_over_sine = np.where(is_turned, angle / np.where(is_turned, size, 1.0), 1.0)
+    return np.asarray(sine * angle_over_sine)
 
 
 def _weigh_by_mass(values: Samples, mass: Samples) -> Samples:
@@ -343,6 +417,7 @@ def _sum_running(steps: Samples) -> Samples:
 def _interpolate_at(time: Samples, values: Samples, when: Samples) -> Samples:
     """Return values (n, ...) at times (k,), interpolated linearly."""
     next_state = np.clip(np.searchsorted(time, when), 1, time.size - 1)
-    share = (when - time[next_state - 1]) / (time[next_state] - time[next_state - 1])
+    last_state = next_state - 1
+    share = (when - time[last_state]) / (time[next_state] - time[last_state])
     share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[next_state - 1] * (1 - share) + values[next_state] * share)
+    return np.asarray(values[last_state] * (1 - share) + values[next_state] * share)

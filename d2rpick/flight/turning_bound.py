@@ -89,10 +89,13 @@ def _compute_largest_factor(
     centres = np.stack([placement.parts[part].centre for part in parts])
     spreads = np.stack([placement.parts[part].spread for part in parts])
     home = np.average(centres, axis=0, weights=mass)
-    second = compute_second_moments((centres - home)[np.newaxis], mass)[0]
-    inertia = compute_inertia(second + np.einsum("p,pij->ij", mass, spreads))
-    light = np.linalg.pinv(inertia, hermitian=True)
+    of_points = compute_second_moments((centres - home)[np.newaxis], mass)[0]
+    of_spreads = np.einsum("p,pij->ij", mass, spreads)
+    inertia = compute_inertia(of_points + of_spreads)
+    inverse_inertia = np.linalg.pinv(inertia, hermitian=True)
     arms = placement.find_nodes(parts) - home
     crossed = np.cross(arms[:, np.newaxis], np.eye(3))
-    factors = np.linalg.eigvalsh(np.einsum("nai,ij,nbj->nab", crossed, light, crossed))
+    # The largest factor of a node over all directions is the largest eigenvalue of its matrix.
+    matrices = np.einsum("nai,ij,nbj->nab", crossed, inverse_inertia, crossed)
+    factors = np.linalg.eigvalsh(matrices)
     return float(factors[:, -1].max())

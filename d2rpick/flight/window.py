@@ -30,12 +30,18 @@ _RINGS = 1 / 3
 # SHORTEST: smallest duration of a flight, as a fraction of the record [-].
 # FEWEST: smallest number of states in a flight.
 SHORTEST, FEWEST = 0.05, 12
+# Smallest number of states from which a load, gravity and damping can be separated; twice the number of unknowns.
+FEWEST_STATES_OF_WORK: Final = 6
 # _ENDS: fraction of a window at each end that is not used to determine the misfit of the free flight itself [-].
 # _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger if the ends are included [-].
 # _REACH: factor by which any other misfit may be larger if the ends are included [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Relative resolution of any quantity [-], because solvers sum in single precision.
 ROUND_OFF = 1e-7
+# Largest relative change of a value of a file that is treated as rounding [-]; files have six to seven digits.
+LAST_DIGIT: Final = 1e-6
+# Smallest ratio of a momentum, an energy or its change to its rounding error at which it shows motion or work [-].
+VISIBLE: Final = 100
 # Step in the list of start times that find all flights, for a search that only needs to find long flights.
 _FAR: Final = 5
 # Largest number of times that the ends of one window are cut off.

@@ -13,6 +13,8 @@ import numpy as np
 from d2rpick.base.memory import remember
 from d2rpick.flight.window import (
     FEWEST,
+    FEWEST_STATES_OF_WORK,
+    VISIBLE,
     Constant,
     FreeFlight,
     Law,
@@ -27,9 +29,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Smallest number of states from which a load, gravity and damping can be separated.
-# This number of states is twice the number of unknowns.
-FEWEST_STATES: Final = 6
 # Relative error of the work of gravity, caused by sampling and by the sums of the solver [-].
 # Contacts are found because they change the energies by more than this fraction of the work of gravity.
 _OWN_ERROR: Final = 1e-3
@@ -53,9 +52,6 @@ _LITTLE, _MUCH = 5e-3, 0.5
 # Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
 _RATE_ERROR: Final = 0.02
 
-# Largest variation of a contact energy that shows no contact, in multiples of its rounding error [-].
-_VISIBLE = 100
-
 
 def compute_work_beyond_gravity(
     balance: Balance, start: float, end: float
@@ -67,7 +63,10 @@ def compute_work_beyond_gravity(
     of the solver's sums are subtracted.  None if the work is not written, or the window has too few states.
     """
     inside = find_window(balance.time, start, end)
-    if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
+    if (
+        balance.external_work is None
+        or balance.time[inside].size < FEWEST_STATES_OF_WORK
+    ):
         return None
     law = _make_law_of_external_work(balance)
     return law.misfit(inside.start, inside.stop - 1)
@@ -113,7 +112,7 @@ class _ExternalWork(Law):
         self._work = balance.external_work
 
     def _misfit(self, first: int, last: int) -> float:
-        if last - first + 1 < FEWEST_STATES:
+        if last - first + 1 < FEWEST_STATES_OF_WORK:
             return 0.0
         return _measure_unexplained_work(
             self._balance, self._work, slice(first, last + 1)
@@ -437,7 +436,7 @@ class _Parabola(Law):
     def _misfit(self, first: int, last: int) -> float:
         states = slice(first, last + 1)
         time = self.time[states]
-        if time.size < FEWEST_STATES:
+        if time.size < FEWEST_STATES_OF_WORK:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
         other_columns = [
@@ -461,7 +460,7 @@ def has_visible_contacts(balance: Balance) -> bool:
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
         return False
-    return float(np.ptp(energy)) > _VISIBLE * balance.precision.noise(energy)
+    return float(np.ptp(energy)) > VISIBLE * balance.precision.noise(energy)
 
 
 @remember

@@ -15,7 +15,6 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, list_names
-from d2rpick.histories.contact_forces import join_contact_forces
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
 from d2rpick.histories.names import (
@@ -201,10 +200,10 @@ class Legs:
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
         """Return the position in each file where a later read can begin; empty if the files are read completely."""
-        points: dict[str, ResumePoint] = {}
-        for leg in self._files:
-            points |= leg.find_resume_points()
-        return points
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.resuming import join_resume_points
+
+        return join_resume_points(leg.find_resume_points() for leg in self._files)
 
     @property
     def energy_channel(self) -> str | None:
@@ -339,6 +338,9 @@ class Legs:
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts and rigid walls that exist in all restart segments."""
+        # Imported here to keep start-up fast.
+        from d2rpick.histories.contact_forces import join_contact_forces
+
         legs = [
             {force.name: force for force in leg.contact_forces} for leg in self._legs
         ]

@@ -14,12 +14,12 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.contact_forces import ContactForce, join_contact_forces
 from d2rpick.histories.samples import find_newest_states
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
@@ -75,6 +75,9 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
     """Join the restart segments of one contact; where two overlap, the newer segment is used."""
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.contact_forces import join_contact_forces
+
     return join_contact_forces(
         pieces, find_newest_states(np.concatenate([piece.time for piece in pieces]))[0]
     )
@@ -82,6 +85,9 @@ def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
 
 def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
     """Yield the forces of one file; raise FormatError if there are none."""
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.contact_forces import ContactForce
+
     data = bytes(source.data)
     is_wall = re.search(_WALL_HEAD, data[:_HEAD]) is not None
     rows = _read_wall_rows(data) if is_wall else _read_contact_rows(data)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from d2rpick.base.tuples import NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 
 class ResumePoint(NamedTuple):
@@ -26,3 +31,15 @@ class ResumePoint(NamedTuple):
         """Convert a resume point in the bytes returned by `read_on` to a resume point in the file."""
         skipped = self.begin - len(self.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
+
+
+def join_resume_points(
+    points_of_files: Iterable[Mapping[str, ResumePoint]],
+) -> dict[str, ResumePoint]:
+    """Return the resume points of several files, by file name; empty if a file is always read completely."""
+    joined: dict[str, ResumePoint] = {}
+    for points in points_of_files:
+        if not points:
+            return {}
+        joined |= points
+    return joined

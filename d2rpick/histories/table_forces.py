@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Legs
 
 # Words in the names of contact forces in tables; Radioss uses names such as FNX.
@@ -30,6 +30,11 @@ def find_forces(database: Legs) -> tuple[ContactForce, ...]:
         for name in database.channels
         if re.search(_OF_CONTACT, name) and not re.search(_NO_FORCE, name)
     ]
+    if not names:
+        return ()
+    # Imported here to keep start-up fast.
+    from d2rpick.histories.contact_forces import ContactForce
+
     return tuple(
         ContactForce.of_changes(
             repr(name), database.time, database.channel(name)[:, np.newaxis]

@@ -230,12 +230,13 @@ class RigidPoints:
 
     def push(self, forces: Plane, damping: float, dt: float) -> None:
         """Advance velocity and spin by one time step [s] under the forces (n,) [N] on the points and damping [1/s]."""
+        # Damping acts on the mean of the velocities before and after the time step.
         half = damping * dt / 2
+        kick = dt * complex(forces.sum()) / self._mass
         moment = float(np.vdot(self.arms, forces).imag)
-        self.velocity = (
-            (1 - half) * self.velocity + dt * complex(forces.sum()) / self._mass
-        ) / (1 + half)
-        self.spin = ((1 - half) * self.spin + dt * moment / self._inertia) / (1 + half)
+        turn = dt * moment / self._inertia
+        self.velocity = ((1 - half) * self.velocity + kick) / (1 + half)
+        self.spin = ((1 - half) * self.spin + turn) / (1 + half)
 
     def move(self, dt: float) -> None:
         """Move the body by one time step [s]; the arms to the points rotate but keep their lengths."""

@@ -19,7 +19,7 @@ _WINDOW: Final = row(
     Field("reason", "text?", "reason why the parts were not switched in this flight; null if they were"),
 )  # fmt: skip
 _LEG: Final = row(
-    Field("kind", "text", "load, probe or rigid"),
+    Field("kind", "text", "load, probe or rigid", lambda leg: leg.order.kind),
     Field("length", "number"),
     Field("cycles", "integer?"),
     Field("cpu", "number?", "CPU time [s]"),
@@ -75,8 +75,8 @@ def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]
 def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     """Return the column names and the rows of the restart segments, with one row per kind of segment."""
     rows: list[list[tables.Cell]] = []
-    for kind in dict.fromkeys(leg.kind for leg in answer.legs):
-        legs_of_kind = [leg for leg in answer.legs if leg.kind == kind]
+    for kind in dict.fromkeys(leg.order.kind for leg in answer.legs):
+        legs_of_kind = [leg for leg in answer.legs if leg.order.kind == kind]
         if any(leg.cpu is None for leg in legs_of_kind):
             cpu = None
         else:

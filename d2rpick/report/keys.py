@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.choice.pair.grades import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.flight import SOURCES
 from d2rpick.report.fields import Field, Kind, get_kind, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 
@@ -60,15 +61,7 @@ HISTORY: Final = row(
     Field("energy_unit", "text", "unit of the energies; empty if no file contains it", later=True),
     name="history",
 )  # fmt: skip
-_SOURCE: Final = one_of(
-    "given",
-    "momentum",
-    "contact-force",
-    "contact-energy",
-    "energy-balance",
-    "oscillator",
-    "energy",
-)
+_SOURCE: Final = one_of(*SOURCES)
 FLIGHT: Final = row(
     Field("start", "number?"),
     Field("end", "number?", "time of the next contact; null if none was found"),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import list_names, make_printable
 from d2rpick.choice.pair.grades import DO_NOT_USE
+from d2rpick.flight import SOURCES
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, get_kind, many, maybe, one_of, row
 from d2rpick.report.situation import (
@@ -21,14 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.report.formats import DisplayOptions
 
-_EVIDENCE: Final = one_of(
-    "momentum",
-    "contact-force",
-    "contact-energy",
-    "energy-balance",
-    "oscillator",
-    "energy",
-)
+_EVIDENCE: Final = one_of(*(source for source in SOURCES if source != "given"))
 _FLIGHT: Final = row(
     Field("start", "number", get=lambda flight: flight[1].start),
     Field("end", "number?", "end of the flight; null if the record ends in flight",

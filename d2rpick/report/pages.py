@@ -66,6 +66,56 @@ _MOST_ROWS = 20
 # Largest number of rows of a table in a notebook.
 _FEW_ROWS: Final = 12
 _WIDEST: Final = "max-width: 40em"  # Largest width of a picture in a notebook.
+# Functions that return the sentences of an answer, and the header and rows of its table, keyed by kind of answer.
+_LOOKS: Final[
+    Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
+] = {
+    "overview": (
+        overview.list_overview_lines,
+        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
+    ),
+    "suggestion": (
+        suggestion.list_verdict,
+        lambda answer: suggestion.build_candidate_table(answer, _FEW_ROWS),
+    ),
+    "verdict": (
+        verdict.list_pair_verdict,
+        lambda answer: (("measure", "value"), verdict.list_known_measures(answer)),
+    ),
+    "trade_off": (
+        trade_off.list_answer_lines,
+        lambda answer: trade_off.build_offer_table(
+            trade_off.select_offers(answer, _FEW_ROWS)
+        ),
+    ),
+    "plan": (
+        lambda answer: [
+            ("", plan.give_plan_sentence(answer)),
+            *plan.list_verdicts(answer),
+            *plan.list_plan_remarks(answer),
+        ],
+        plan.build_flight_table,
+    ),
+    "parts": (
+        parts.list_verdict_on_set,
+        lambda answer: parts.build_part_table(
+            answer, next(iter(parts.TABLES.values()))
+        ),
+    ),
+    "study": (
+        lambda answer: [*study.list_outcome(answer), *study.list_run_reasons(answer)],
+        study.build_run_table,
+    ),
+}
+# Functions that return the numbered reasons for the verdicts in a table, keyed by kind of answer.
+_REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
+    "suggestion": lambda answer: suggestion.list_candidate_reasons(
+        answer, answer.candidates[:_FEW_ROWS]
+    ),
+    "trade_off": lambda answer: trade_off.list_offer_reasons(
+        trade_off.select_offers(answer, _FEW_ROWS)
+    ),
+}
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
@@ -589,60 +639,6 @@ def drive_page(answer: Driven, command: Sequence[str]) -> str:
         page.build_command(command),
         signed=page.CHECKED,
     )
-
-
-# Functions that return the sentences of an answer, and the header and rows of its table, keyed by kind of answer.
-_LOOKS: Final[
-    Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
-] = {
-    "overview": (
-        overview.list_overview_lines,
-        lambda answer: (("", ""), _select_known_facts(overview.list_facts(answer)[1:])),
-    ),
-    "suggestion": (
-        suggestion.list_verdict,
-        lambda answer: suggestion.build_candidate_table(answer, _FEW_ROWS),
-    ),
-    "verdict": (
-        verdict.list_pair_verdict,
-        lambda answer: (("measure", "value"), verdict.list_known_measures(answer)),
-    ),
-    "trade_off": (
-        trade_off.list_answer_lines,
-        lambda answer: trade_off.build_offer_table(
-            trade_off.select_offers(answer, _FEW_ROWS)
-        ),
-    ),
-    "plan": (
-        lambda answer: [
-            ("", plan.give_plan_sentence(answer)),
-            *plan.list_verdicts(answer),
-            *plan.list_plan_remarks(answer),
-        ],
-        plan.build_flight_table,
-    ),
-    "parts": (
-        parts.list_verdict_on_set,
-        lambda answer: parts.build_part_table(
-            answer, next(iter(parts.TABLES.values()))
-        ),
-    ),
-    "study": (
-        lambda answer: [*study.list_outcome(answer), *study.list_run_reasons(answer)],
-        study.build_run_table,
-    ),
-}
-
-
-# Functions that return the numbered reasons for the verdicts in a table, keyed by kind of answer.
-_REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
-    "suggestion": lambda answer: suggestion.list_candidate_reasons(
-        answer, answer.candidates[:_FEW_ROWS]
-    ),
-    "trade_off": lambda answer: trade_off.list_offer_reasons(
-        trade_off.select_offers(answer, _FEW_ROWS)
-    ),
-}
 
 
 def give_sentence(kind: str, answer: Any) -> str:

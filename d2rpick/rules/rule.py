@@ -93,10 +93,13 @@ def write_automatic_card(
     code: int = 0,
     pair: tuple[int, int] = (0, 0),
     counts: tuple[int, int] | None = None,
+    delay: str = "0.0",
+    contact: int = 0,
 ) -> str:
     """Return a *DEFORMABLE_TO_RIGID_AUTOMATIC card.
 
-    ``pair`` holds RELSW and PAIRED. ``counts`` holds D2R and R2D, for an example with wrong counts.
+    ``pair`` holds RELSW and PAIRED. ``counts`` holds D2R and R2D, for an example with wrong counts. ``delay`` is TIME3
+    and ``contact`` is ENTNO.
     """
     d2r, r2d = counts or (len(rigid), len(deformable))
     relsw, paired = pair
@@ -104,7 +107,13 @@ def write_automatic_card(
         "*DEFORMABLE_TO_RIGID_AUTOMATIC",
         "$    swset      code     time1     time2     time3     entno     relsw    paired",
         SWITCH_TIMES.write(
-            SWSET=swset, CODE=code, TIME1=time1, RELSW=relsw, PAIRED=paired
+            SWSET=swset,
+            CODE=code,
+            TIME1=time1,
+            TIME3=delay,
+            ENTNO=contact,
+            RELSW=relsw,
+            PAIRED=paired,
         ),
         "$     nrbf      ncsf       rwf     dtmax       d2r       r2d    offset",
         SWITCH_COUNTS.write(RWF=0, D2R=d2r, R2D=r2d),

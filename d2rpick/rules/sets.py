@@ -63,10 +63,9 @@ def _make_paired_deck(
 def _make_force_deck(
     code: int, entno: int, time3: str = "1.0e-3", contact: str = ""
 ) -> Example:
-    card = write_automatic_card(1, "0.0", rigid=["1"], code=code)
-    old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}{0:10d}"
-    assert old in card
-    card = card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{time3:>10s}{entno:10d}", 1)
+    card = write_automatic_card(
+        1, "0.0", rigid=["1"], code=code, delay=time3, contact=entno
+    )
     return make_deck(contact + card)
 
 
@@ -395,11 +394,10 @@ def _find_controlled(card: Card) -> Iterator[int]:
 def _make_delayed_deck(wait: str) -> Example:
     """Return a deck with a pair of sets; ``wait`` is TIME3 of the set that makes the parts deformable."""
     rigid_card = write_automatic_card(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
-    back_card = write_automatic_card(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
-    old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}"
-    return make_deck(
-        rigid_card + back_card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1)
+    back_card = write_automatic_card(
+        2, "0.0", deformable=["1"], code=4, pair=(1, -1), delay=wait
     )
+    return make_deck(rigid_card + back_card)
 
 
 @set_passing(PASS, _with_floor(4, 7), _make_delayed_deck("0.01"))

@@ -506,7 +506,7 @@ def _check_flight(case: Case) -> Iterator[Objection]:
     """If tr lies before the end of the load, an equal energy is a coincidence, and the motion of the body is wrong. If
     td lies after the next contact, a rigid part does not deform in this contact. d2rpick finds the start and end of the
     flight from the momentum or the energy in the history, or uses the time of --after. It also reports a history that
-    does not show the flight.
+    does not show the flight, and a part that a support or a prescribed motion of the deck keeps from flying.
 
     Fix: Move tr after the load and td before the next contact. If the history does not show when the load ends, give
     --after.

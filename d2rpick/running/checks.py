@@ -57,15 +57,15 @@ def check_driven(
     if starter is None or not list_forces(starter):
         raise DeckError(f"{path}: {NO_CONTACT}")
     _check_history(path, starter, {*parts} - inventory.springs)
-    shortest = FEWEST * limits.interval
-    if wait is not None and not shortest <= wait < limits.end / 2:
+    shortest, longest = FEWEST * limits.interval, limits.end / 2
+    if wait is not None and not shortest <= wait < longest:
         raise RangeError(
-            f"{path}: `wait` {wait:g}: a time from {shortest:g}, {FEWEST} states of the history, to {limits.end / 2:g},"
-            " half of the run, was expected"
+            f"{path}: `wait` {wait:g}: a time from {shortest:g}, {FEWEST} states of the history, to {longest:g}, half"
+            " of the run, was expected"
         )
-    if limits.margin is not None and not limits.margin < limits.end / 2:
+    if limits.margin is not None and not limits.margin < longest:
         raise RangeError(
-            f"{path}: `margin` {limits.margin:g}: less than {limits.end / 2:g}, half of the run, was expected"
+            f"{path}: `margin` {limits.margin:g}: less than {longest:g}, half of the run, was expected"
         )
 
 
@@ -74,8 +74,10 @@ def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
     cards = [card for card in starter.named("TH") if card.words[1:2] == ("PART",)]
     written: set[int] = set()
     for card in cards:
-        rows = [row.text for row in card.rows[1:] if not row.text.startswith("#")]
-        words = {*" ".join(rows).split()}
+        words: set[str] = set()
+        for row in card.rows[1:]:
+            if not row.text.startswith("#"):
+                words |= {*row.text.split()}
         if words & {"DEF", "XMOM"}:
             written |= {int(word) for word in words if word.isdigit()} or {*parts}
     if missing := sorted({*parts} - written):

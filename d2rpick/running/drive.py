@@ -16,9 +16,6 @@ from d2rpick.base.files import (
     parse_record,
     write_as_a_whole,
 )
-from d2rpick.histories.names import Selection
-from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     Leg,
     LegFindings,
@@ -34,12 +31,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.base.errors import Caution
-    from d2rpick.deck.model import Inventory
     from d2rpick.deck.writing import DrivenDeck
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
-    from d2rpick.running.engine import Commands, Solver
-    from d2rpick.running.inner_motion import Wait
+    from d2rpick.running.engine import Solver
+    from d2rpick.running.evidence import GrowingEvidence
+    from d2rpick.running.looks import Looks
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
@@ -88,9 +85,8 @@ class Driver:
     deck: DrivenDeck
     solver: Solver
     journal: Journal
-    commands: Commands
     limits: Limits
-    observer: Observer
+    looks: Looks
     told: Callable[[str], None]
     at: Order | None = None
 
@@ -106,13 +102,13 @@ class Driver:
         if self.journal.has("prepared") and self.solver.whole(0):
             return
         # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
-        first_engine_file = self.solver.file(1, ".rad").name
-        first_leg = self.deck.leg(1, self.deck.end, None)
-        for name, content in {**self.deck.files, first_engine_file: first_leg}.items():
+        engine_file = self.solver.file(1, ".rad").name
+        files = {engine_file: self.deck.leg(1, self.deck.end, None), **self.deck.files}
+        for name, content in files.items():
             path = self.solver.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             write_as_a_whole(path, content)
-        self._start_solver("starter", 0)
+        self.solver.start("starter", 0)
         self._wait_for_end()
         if not self.solver.started_well():
             raise D2RPickError(
@@ -139,6 +135,9 @@ class Driver:
             self.told(
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
+            if self.journal.has_failed:
+                # The restart file may be damaged although it looks complete.
+                self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
             # An earlier driver may have begun the engine run, and the solver may have finished it since.
@@ -154,39 +153,35 @@ class Driver:
 
     def _choose_next(self) -> Order | None:
         """Choose the next engine run. If its restart file is damaged, go back to a complete restart file."""
-        while True:
-            legs = self.journal.legs
-            order = choose_next_leg(legs, self.limits)
-            if order is None or not legs or self.solver.whole(order.number - 1):
-                return order
-            self.journal.add("back", legs=len(legs) - 1)
-            self.told(
-                "the restart file of the last engine run is incomplete: the run goes back to "
-                f"{legs[-1].order.start:.6g}"
-            )
+        legs = self.journal.legs
+        order = choose_next_leg(legs, self.limits)
+        if order is None or not legs or self.solver.whole(order.number - 1):
+            return order
+        self._go_back("its restart file is incomplete")
+        return self._choose_next()
+
+    def _go_back(self, reason: str) -> None:
+        """Discard the last engine run, so that it is computed again."""
+        legs = self.journal.legs
+        self.journal.add("back", legs=len(legs) - 1)
+        start = legs[-1].order.start
+        self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
         """Write the engine file of an engine run, and start the engine."""
         number = order.number
-        self.solver.check_room(number, 1 - order.start / self.limits.end)
+        self.solver.check_room(number)
         self.solver.clear(number)
         legs = self.journal.legs
         already_rigid = order.rigid and len(collect_joined_legs(order, legs)) > 1
-        largest_step = None
-        if order.rigid:
-            largest_step = _limit_rigid_step(legs, self.deck.interval)
+        largest_step = _limit_step(order, legs, self.deck.interval)
         text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
         write_as_a_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
-        self._start_solver("engine", number)
+        self.solver.start("engine", number)
         self.told(
             f"engine run {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
-
-    def _start_solver(self, program: str, number: int) -> None:
-        """Start the solver for an engine run: the starter if its ``number`` is 0, otherwise the engine."""
-        deck = self.solver.file(number, ".rad").name
-        self.solver.start(self.commands.words(program, deck), number)
 
     def _wait_for_end(self) -> None:
         """Wait until no solver is running; report silence, and stop the solver on KeyboardInterrupt."""
@@ -218,41 +213,30 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Record in the journal that an engine run has failed, so that it is computed again.
-
-        If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
-        back by the leg that wrote it.
+        """Record in the journal that an engine run has failed; if its files are incomplete, it is computed again once.
 
         Raises
         ------
         D2RPickError
-            If the solver reported an error for the first time, or the leg has failed before.
+            If the solver reported an error, or the engine run has failed before.
         """
         has_failed = self.journal.has_failed
         self.journal.add("failed", leg=order.number)
-        name = f"engine run {order.number}"
-        legs = self.journal.legs
-        begins = bool(np.any(self.solver.read_times(order.number) >= order.start))
-        if not has_failed and self.solver.ended_well(order.number):
-            self.told(
-                f"{name}: its restart file or history is incomplete; computing it again from {order.start:.6g}"
-            )
-        elif has_failed and legs and not begins:
-            self.journal.add("back", legs=len(legs) - 1)
-            self.told(
-                f"{name} failed again before its first state; computing the engine run before it again"
-            )
-        else:
+        if has_failed or not self.solver.ended_well(order.number):
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: {problem}")
+        self.told(
+            f"engine run {order.number}: its restart file or history is incomplete; "
+            f"computing it again from {order.start:.6g}"
+        )
 
     def _end(self, order: Order) -> None:
         """Record the findings of an engine run in the journal."""
         number, legs = order.number, self.journal.legs
         joined_legs = collect_joined_legs(order, legs)
         first = joined_legs[0]
-        histories = [self.solver.history(leg.number) for leg in joined_legs]
-        wait_before = _find_longest_wait(legs, first.start)
-        findings = self.observer.look(order, histories, wait_before)
+        histories = [str(self.solver.history(leg.number)) for leg in joined_legs]
+        self.looks.look(histories, _find_longest_wait(legs, first.start))
+        findings = find_leg_results(order, self.looks.evidence)
         cycles, cpu = self.solver.took(number)
         self.journal.add("ended", order=order, seen=findings, cycles=cycles, cpu=cpu)
         if findings.contact is not None:
@@ -266,8 +250,10 @@ class Driver:
         self.solver.keep(kept_restarts)
 
 
-def _limit_rigid_step(legs: Sequence[Leg], interval: float) -> float:
+def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
     """Return the largest time step of a rigid engine run, from the smallest mean step of the deformable ones [time]."""
+    if not order.rigid:
+        return None
     steps = [
         leg.length / leg.cycles for leg in legs if not leg.order.rigid and leg.cycles
     ]
@@ -285,83 +271,41 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
     return max(waits, default=0.0)
 
 
-class Observer:
-    """Reads the histories of engine runs for some ``parts`` of a deck.
-
-    ``wait`` is the wait that the user gave, ``of_deck`` the wait that follows from the deck.
-    """
-
-    def __init__(
-        self,
-        parts: Sequence[int],
-        inventory: Inventory,
-        wait: float | None = None,
-        of_deck: Wait | None = None,
-    ) -> None:
-        springs = sorted(inventory.springs)
-        selection = Selection(
-            parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
-        )
-        self._looks = Looks(selection, inventory)
-        self._waits = (wait, of_deck)
-        self._evidence = GrowingEvidence(*self._waits)
-
-    def look(
-        self, order: Order, histories: Sequence[Path], wait_before: float
-    ) -> LegFindings:
-        """Return the findings from the joined histories of several engine runs, at the end of the last of them.
-
-        ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
-        the record shows a longer one, which ``why`` then says.
-        """
-        names = [str(path) for path in histories]
-        states, follows = self._looks.new_states(names)
-        if not follows:
-            self._evidence = GrowingEvidence(*self._waits, wait_before)
-        if states.time.size:
-            self._evidence.take(states)
-        history = self._evidence.history
-        if order.rigid:
-            return LegFindings(contact=self._evidence.find_contact())
-        return self._find_flight(order, history)
-
-    def _find_flight(self, order: Order, history: History) -> LegFindings:
-        """Return the findings of a deformable engine run."""
-        now = float(history.time[-1])
-        flights = self._evidence.flights()
-        free = self._evidence.free_since(now)
-        wait = self._evidence.motion.wait(free, now)
-        flies = bool(flights) and flights[-1].end is None
-        tr = _choose_end(order, history, free)
-        swing = find_swing(history, free, tr) if flies else None
-        # These flights were slightly too short to be switched.
-        short_flights = tuple(
-            (start, end)
-            for start, end in self._evidence.pauses(order.start)
-            if wait is not None
-            and end - start >= _REPORTED * wait.time
-            and start >= order.switch_after
-        )
-        return LegFindings(
-            free=free,
-            wait=wait.time if wait else None,
-            why=wait.reason if wait else "",
-            flies=flies,
-            tr=tr,
-            idle=wait is not None and wait.source == "at-rest",
-            short=short_flights,
-            swing=self._evidence.motion.longest_swing(now),
-            steady_from=swing.flight if swing else 0.0,
-            swing_warning=swing.told if swing else "",
-        )
+def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
+    """Return the findings at the end of an engine run from the evidence of all engine runs that are joined to it."""
+    if order.rigid:
+        return LegFindings(contact=evidence.find_contact())
+    history = evidence.history
+    flights = evidence.flights()
+    flies = bool(flights) and flights[-1].end is None
+    free = evidence.free_since(history.end)
+    tr = _choose_end(order, history, free)
+    half_period = evidence.motion.longest_swing(history.end)
+    findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)
+    if flies and (swing := find_swing(history, free, tr)):
+        findings = findings._replace(steady_from=swing.flight, swing_warning=swing.told)
+    wait = evidence.find_wait(free, history.end)
+    if wait is None:
+        return findings
+    # These flights were slightly too short to be switched.
+    short_flights = tuple(
+        (start, end)
+        for start, end in evidence.pauses(order.start)
+        if end - start >= _REPORTED * wait.time and start >= order.switch_after
+    )
+    is_idle = wait.source == "at-rest"
+    return findings._replace(
+        wait=wait.time, why=wait.reason, idle=is_idle, short=short_flights
+    )
 
 
 def _choose_end(order: Order, history: History, free: float) -> float:
     """Choose tr: the start of an engine run in flight if it has more internal energy than the end, else the end."""
-    start = max(order.start, float(history.time[0]))
-    falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
-    starts_in_flight = order.start >= max(free, order.switch_after)
-    return order.start if falls and starts_in_flight else order.until
+    start = max(order.start, history.start)
+    falls = history.energy_at(start) > history.energy_at(history.end)
+    if falls and order.start >= max(free, order.switch_after):
+        return order.start
+    return order.until
 
 
 class Journal:
@@ -384,7 +328,9 @@ class Journal:
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":
-                legs.append(_read_leg(record))
+                order = Order(*record["order"])
+                findings = LegFindings(*record["seen"])
+                legs.append(Leg(order, findings, record["cycles"], record["cpu"]))
             elif record["event"] == "back":
                 del legs[record["legs"] :]
         return legs
@@ -392,9 +338,8 @@ class Journal:
     @property
     def has_failed(self) -> bool:
         """True if the next engine run has failed before."""
-        outcomes = ("prepared", "ended", "back", "failed")
         events = [record["event"] for record in self.records]
-        return [event for event in events if event in outcomes][-1:] == ["failed"]
+        return [event for event in events if event != "started"][-1:] == ["failed"]
 
     def has(self, event: str) -> bool:
         """Return True if the journal contains a record of the named event."""
@@ -412,9 +357,3 @@ class Journal:
             ) from None
         self._line_end = b""
         self.records.append(json.loads(line))
-
-
-def _read_leg(record: dict[str, Any]) -> Leg:
-    """Make the result of an engine run from a record of the journal."""
-    order, findings = Order(*record["order"]), LegFindings(*record["seen"])
-    return Leg(order, findings, record["cycles"], record["cpu"])

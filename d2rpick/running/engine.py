@@ -29,7 +29,7 @@ from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import find_radioss_timing, read_tail
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Iterator
 
     from d2rpick.histories.history import Samples
 
@@ -45,10 +45,10 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
 # Number of bytes that are read from the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# _LISTING_SIZE: number of bytes read from the end of a starter listing, in which much output follows the errors.
-# _ERROR: characters at the beginning of an error in a listing.
-# _ERROR_LINES: number of lines of an error in a listing.
-_LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
+# Number of bytes read from the end of a listing to find errors; in a starter listing, much output follows them.
+_LISTING_SIZE: Final = 1 << 22
+# An error in a listing: its first line and the next three.
+_ERROR_LINES: Final = r".*\*\* ERROR.*(?:\n.*){0,3}"
 _MOST_LINES: Final = 8
 # Smallest size of a complete restart file, as a fraction of the size of the starter's restart file [-].
 _WHOLE: Final = 0.98
@@ -72,30 +72,31 @@ class Commands(NamedTuple):
         ConfigurationError
             If the command cannot be split or does not name the deck, or no installation is known.
         """
-        template = getattr(self, program)
-        if template is None:
-            template = _find_installed(program)
+        template = getattr(self, program) or _find_installed(program)
         if "{deck}" not in template:
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
         try:
-            executable, *arguments = shlex.split(template)
+            words = shlex.split(template)
         except ValueError as error:
             raise ConfigurationError(
                 f"--{program} {template!r}: cannot be split into words ({error})"
             ) from None
-        if "/" in executable:
+        if "/" in words[0]:
             # The path is made absolute, because the program is started in another folder.
-            executable = str(Path(executable).absolute())
-        threads = str(self.threads)
-        return [
-            executable,
-            *(
-                word.replace("{deck}", deck).replace("{threads}", threads)
-                for word in arguments
-            ),
-        ]
+            words[0] = str(Path(words[0]).absolute())
+        words = [word.replace("{threads}", str(self.threads)) for word in words]
+        return [word.replace("{deck}", deck) for word in words]
+
+    def make_environment(self) -> dict[str, str]:
+        """Return the environment of the programs: the current one, with the variables of an installation."""
+        environment = {"OMP_NUM_THREADS": str(self.threads), "OMP_STACKSIZE": "400m"}
+        libraries = os.environ.get("LD_LIBRARY_PATH", "")
+        if home := os.environ.get(_HOME):
+            environment["RAD_CFG_PATH"] = f"{home}/hm_cfg_files"
+            libraries = f"{home}/exec:{libraries}:{home}/syslib".replace("::", ":")
+        return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
     def missing(self) -> str:
         """Return the first program that cannot be started; empty if all can be started."""
@@ -117,17 +118,6 @@ def _find_installed(program: str) -> str:
     raise ConfigurationError(
         f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
     )
-
-
-def _make_environment(threads: int) -> dict[str, str]:
-    """Return the environment of the programs: the current one, with the variables of an installation."""
-    environment = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
-    libraries = os.environ.get("LD_LIBRARY_PATH", "")
-    if home := os.environ.get(_HOME):
-        environment["RAD_CFG_PATH"] = f"{home}/hm_cfg_files"
-        paths = (f"{home}/exec", libraries, f"{home}/syslib")
-        libraries = os.pathsep.join(filter(None, paths))
-    return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
 
 @contextmanager
@@ -163,8 +153,8 @@ class Solver:
     The process keeps a lock while it lives, so that a later driver can see it.
     """
 
-    def __init__(self, folder: Path, name: str, threads: int = 1) -> None:
-        self.folder, self.name, self.threads = folder, name, threads
+    def __init__(self, folder: Path, name: str, commands: Commands) -> None:
+        self.folder, self.name, self.commands = folder, name, commands
         self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
         self._signal = 0  # Number of the signal that ended the last process, or 0.
@@ -183,26 +173,26 @@ class Solver:
             path.unlink()
         self.history(number).unlink(missing_ok=True)
 
-    def start(self, command: Sequence[str], number: int) -> None:
-        """Start the solver for an engine run.
+    def start(self, program: str, number: int) -> None:
+        """Start the solver for an engine run: the starter if its ``number`` is 0, otherwise the engine.
 
         Raises
         ------
         D2RPickError
-            If it cannot be started, or another one is running in the folder.
+            If it cannot be started.
         """
+        command = self.commands.words(program, self.file(number, ".rad").name)
         lock = _lock(self._lock_path)
-        if lock is None:
-            raise D2RPickError(
-                f"{self.folder}: a solver is running there; wait for its end"
-            )
+        assert (
+            lock is not None
+        )  # The driver has waited for the end of any other solver.
         try:
             _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:
                 # A new session keeps Ctrl-C from the solver, because the driver itself stops all its processes.
                 self._process = subprocess.Popen(
-                    command, cwd=self.folder, env=_make_environment(self.threads), stdin=subprocess.DEVNULL, stdout=log,
-                    stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
+                    command, cwd=self.folder, env=self.commands.make_environment(), stdin=subprocess.DEVNULL,
+                    stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
                 )  # fmt: skip
             os.ftruncate(lock, 0)
             os.pwrite(lock, str(self._process.pid).encode(), 0)
@@ -243,7 +233,8 @@ class Solver:
     def silent_for(self) -> float:
         """Return the time since the solver last wrote output [s]."""
         now = time.time()
-        times = [status.st_mtime for status in self._list_status("*")]
+        paths = self.folder.glob(f"{self.name}*")
+        times = [path.stat().st_mtime for path in paths if path.exists()]
         return max(0.0, now - max(times, default=now))
 
     def ended_well(self, number: int) -> bool:
@@ -262,16 +253,15 @@ class Solver:
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
         """
-        of_starter, restarts = self._find_restarts(0), self._find_restarts(number)
-        if not of_starter or not of_starter.keys() <= restarts.keys():
-            return False
-        for domain, first in of_starter.items():
-            restart = restarts[domain]
-            is_named = _has_its_name(restart) or not _has_its_name(first)
+        starter_restarts = self._find_restarts(0)
+        for first in starter_restarts:
+            restart = self.file(number, first.name[-9:])
             least_size = max(_WHOLE * first.stat().st_size, 1)
-            if not is_named or restart.stat().st_size < least_size:
+            if not restart.exists() or restart.stat().st_size < least_size:
                 return False
-        return True
+            if _has_its_name(first) and not _has_its_name(restart):
+                return False
+        return bool(starter_restarts)
 
     def read_times(self, number: int) -> Samples:
         """Return the times of the states in the history of an engine run [time]; empty if it cannot be read."""
@@ -288,31 +278,28 @@ class Solver:
 
     def last_words(self, number: int) -> str:
         """Return in one line the errors that the solver reported, or else the last lines that it printed."""
-        listing = self._read_end(number, ".out", _LISTING_SIZE).splitlines()
-        rows = [row for row, line in enumerate(listing) if _ERROR in line]
-        errors = [line for row in rows for line in listing[row : row + _ERROR_LINES]]
-        printed = self._read_end(number, ".log").splitlines() or listing
-        lines = [line for line in errors or printed if line.strip(" -*")]
-        lines = lines[:_MOST_LINES] if errors else lines[-_MOST_LINES:]
-        text = " | ".join(" ".join(line.split()) for line in lines)
-        ended = f"ended by signal {self._signal}; " if self._signal else ""
+        listing = self._read_end(number, ".out", _LISTING_SIZE)
+        errors = _split_lines("\n".join(re.findall(_ERROR_LINES, listing)))
+        printed = _split_lines(self._read_end(number, ".log") or listing)
+        text = " | ".join(errors[:_MOST_LINES] or printed[-_MOST_LINES:])
+        words = [text or "nothing was printed"]
         free = shutil.disk_usage(self.folder).free
         if free < self._measure_largest_restart():
             # A solver that cannot write its files prints no error.
-            ended += f"the disk is full, {free / 1e6:.3g} MB are free; "
-        return ended + (make_printable(text) or "nothing was printed")
+            words.insert(0, f"the disk is full, {free / 1e6:.3g} MB are free")
+        if self._signal:
+            words.insert(0, f"ended by signal {self._signal}")
+        return make_printable("; ".join(words))
 
     def keep(self, numbers: Collection[int]) -> None:
         """Remove all restart files except those of the given engine runs and of the starter."""
         for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
-            for path in self._find_restarts(number).values():
-                path.unlink()
+            for restart in self._find_restarts(number):
+                restart.unlink()
 
-    def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError if the disk has no room for an engine run; the fraction ``share`` is still to compute."""
-        written = sum(status.st_size for status in self._list_status("T[0-9][0-9]"))
-        to_come = round(written * share / max(1 - share, 0.1))
-        needed = 2 * self._measure_largest_restart() + to_come
+    def check_room(self, number: int) -> None:
+        """Raise D2RPickError if the disk has no room for the restart files of an engine run and of the next one."""
+        needed = 2 * self._measure_largest_restart()
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -324,20 +311,20 @@ class Solver:
         """Return the last bytes of a file of an engine run as text; empty if the file is missing."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
 
-    def _find_restarts(self, number: int) -> dict[str, Path]:
-        """Return the restart files of an engine run, keyed by domain, which is the end of the file name."""
-        paths = self.folder.glob(f"{self.name}_{number:04d}_*.rst")
-        return {path.name[-8:]: path for path in paths}
+    def _find_restarts(self, number: int | None = None) -> list[Path]:
+        """Return the restart files of an engine run, one for each domain, or those of all engine runs."""
+        leg = "*" if number is None else f"{number:04d}"
+        return [*self.folder.glob(f"{self.name}_{leg}_*.rst")]
 
     def _measure_largest_restart(self) -> int:
         """Return the size of the largest restart file of the run [bytes]; 0 if there is no restart file."""
-        sizes = (status.st_size for status in self._list_status("_*.rst"))
+        sizes = [restart.stat().st_size for restart in self._find_restarts()]
         return max(sizes, default=0)
 
-    def _list_status(self, pattern: str) -> list[os.stat_result]:
-        """Return the status of the files whose names consist of the run's name and a pattern."""
-        paths = self.folder.glob(f"{self.name}{pattern}")
-        return [path.stat() for path in paths if path.exists()]
+
+def _split_lines(text: str) -> list[str]:
+    """Return the lines of an output without needless blanks; lines without content are left out."""
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip(" -*")]
 
 
 def _has_its_name(restart: Path) -> bool:

@@ -7,40 +7,38 @@ has the same flights as the finished one.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.flight.momentum import get_laws_of, is_complete
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, select_states
-from d2rpick.histories.samples import find_stretches
-from d2rpick.running.inner_motion import InnerMotion
-from d2rpick.running.record import (
-    GrowingColumn,
-    GrowingRecord,
-    RunningMaximum,
-)
+from d2rpick.histories.samples import find_stretches, find_window
+from d2rpick.running.inner_motion import InnerMotion, Wait
+from d2rpick.running.record import GrowingColumn, RunningMaximum
 from d2rpick.running.witness import GrowingWitness, Quiet
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.running.inner_motion import Wait
+    from d2rpick.running.inner_motion import MovingParts
 
 # Largest number of states from which gravity is determined.
 _GRAVITY_STATES: Final = 1000
+# An internal energy below this share of the kinetic energy is round-off and shows no vibration [-].
+_ROUND_OFF: Final = 1e-6
 
 
 class GrowingEvidence:
     """Finds the force-free time and the flights of the parts of a growing record.
 
-    ``given``, ``of_deck`` and ``before`` are those of its inner ``motion``.
+    ``given`` is the user's waiting time [time], ``of_deck`` and ``before`` are those of the inner ``motion``.
     """
+
+    history: History
 
     def __init__(
         self,
@@ -48,50 +46,39 @@ class GrowingEvidence:
         of_deck: Wait | None = None,
         before: float = 0.0,
     ) -> None:
-        self.motion = InnerMotion(self, given, of_deck, before)
-        self._record = GrowingRecord()
-        self._witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, keyed by the momentum columns of its parts; the key of the whole model is None.
-        self._going_on: dict[tuple[int, ...] | None, GrowingWitness] = {}
+        self.given = given
+        # Events of past flights, keyed by the start of the flight and the time at which it was detected.
+        self.decided: dict[tuple[float, float], tuple[Any, ...]] = {}
+        self.motion = InnerMotion(of_deck, before)
+        # Evidence for each set of parts, followed by that for the model if its momentum or contact energy is known.
+        self.witnesses: list[GrowingWitness] = []
+        # Evidence that still grows, keyed by its parts; the key of the whole model is None.
+        self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
-        self._has_moved = RunningMaximum()
+        self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
         # True for each state at which the part momenta add up to the momentum of the model.
         self._complete = GrowingColumn()
-        self._largest_momentum = 0.0
-        self.moving: list[tuple[slice, tuple[int, ...]]] = []
 
-    @property
-    def history(self) -> History:
-        """All states read so far."""
-        return self._record.history
-
-    @property
-    def witnesses(self) -> list[GrowingWitness]:
-        """Evidence for each set of parts, followed by that for the model if its momentum or contact energy is known."""
-        return sorted(self._witnesses, key=_is_of_model)
-
-    def take(self, states: History) -> None:
-        """Append states, which must have the same quantities as the states so far."""
-        self._record.add(states)
-        balance = states.balance
+    def take(self, states: History, history: History) -> None:
+        """Append states, which must have the same quantities as the states so far; ``history`` are all states."""
+        self.history = history
+        contact = states.balance
+        if contact is not None and contact.sliding is None:
+            contact = None
         of_model = states.find_momenta(of_parts=False)
         of_parts = states.find_momenta(of_parts=True)
-        self.moving = []
+        moving_parts: MovingParts = []
         if of_parts is not None and of_parts.time.size:
-            self._add_parts(of_parts, of_model, balance)
-        if of_model is not None:
-            columns = _make_columns(of_model.time, of_model.of((0,)), balance)
-            self._add((0,), None, columns, (of_model, balance))
-        elif balance is not None and balance.sliding is not None:
-            motionless = np.zeros((balance.time.size, 3))
-            columns = _make_columns(balance.time, motionless, balance)
-            self._add((), None, columns, (None, balance))
-        self.motion.take(states)
+            moving_parts = self._add_parts(of_parts, of_model, contact)
+        members = () if of_model is None else (0,)
+        columns = _make_columns(members, of_model, contact)
+        self._add(members, None, columns, (of_model, contact))
+        self.motion.take(states, moving_parts, self.free_since)
 
     def _add_parts(
-        self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
-    ) -> None:
-        """Append part momenta to the evidence for all sets of parts that may fly together.
+        self, momenta: Momenta, of_model: Momenta | None, contact: Balance | None
+    ) -> MovingParts:
+        """Append part momenta to the evidence for all sets of parts that may fly together, and return the moving parts.
 
         The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
         when a rigid body has absorbed some parts.
@@ -106,19 +93,21 @@ class GrowingEvidence:
             self._first_momenta = momenta.values[:1]
         changed = (momenta.values != self._first_momenta).any(axis=2)
         has_moved = self._has_moved.add(changed)
-        moves = has_moved & are_complete[:, np.newaxis]
-        changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
-        for begin, end in pairwise([0, *changes.tolist(), len(moves)]):
-            numbers = tuple(np.flatnonzero(moves[begin]).tolist())
-            self.moving.append((slice(begin, end), numbers))
         for members in dict.fromkeys(_list_sets(momenta)):
-            columns = _make_columns(momenta.time, momenta.of(members), balance)
+            columns = _make_columns(members, momenta, contact)
             # Contact energy shows collisions between bodies, which do not change the total momentum.
             # Once other parts move, the contact energy includes their contacts, and is no longer used.
-            other_parts = sorted({*range(len(momenta.parts))} - {*members})
-            columns[has_moved[:, other_parts].any(axis=1), 1] = np.nan
+            other_parts = np.delete(has_moved, members, axis=1)
+            columns[other_parts.any(axis=1), 1] = np.nan
+            columns[~are_complete, 2:] = np.nan
             parts = tuple(momenta.parts[number] for number in members)
-            self._add(members, parts, columns, (momenta, balance), are_complete)
+            self._add(members, parts, columns, (momenta, contact))
+        moves = has_moved & are_complete[:, np.newaxis]
+        changes = 1 + np.flatnonzero((moves[1:] != moves[:-1]).any(axis=1))
+        return [
+            (slice(begin, end), np.flatnonzero(moves[begin]).tolist())
+            for begin, end in pairwise([0, *changes.tolist(), len(moves)])
+        ]
 
     def _add(
         self,
@@ -126,42 +115,74 @@ class GrowingEvidence:
         parts: tuple[Part, ...] | None,
         columns: Samples,
         written: tuple[Momenta | None, Balance | None],
-        is_used: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Append states to the evidence for a set of parts; after unusable states, the evidence starts again.
+        """Append states to the evidence for a set of parts; after states without momentum, the evidence starts again.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
-        key = None if parts is None else members
-        used = np.ones(len(columns), np.bool_) if is_used is None else is_used
         precisions = [table.precision if table else EXACT for table in written]
-        for stretch in find_stretches(used):
-            if stretch.start > 0 or key not in self._going_on:
-                self._going_on[key] = GrowingWitness(members, parts)
-                self._witnesses.append(self._going_on[key])
-            self._going_on[key].add(columns[stretch], *precisions)
-        if used.size and not used[-1]:
-            self._going_on.pop(key, None)
+        has_momentum = ~np.isnan(columns[:, 2])
+        for stretch in find_stretches(has_momentum):
+            if stretch.start > 0 or parts not in self._going_on:
+                self._going_on[parts] = GrowingWitness(members, parts)
+                self.witnesses.append(self._going_on[parts])
+                self.witnesses.sort(key=lambda witness: witness.parts is None)
+            self._going_on[parts].add(columns[stretch], *precisions)
+        if not has_momentum[-1:].all():
+            self._going_on.pop(parts, None)
 
     def flights(self) -> tuple[Quiet, ...]:
         """Return all flights that lasted for their required force-free time, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
+        candidates: list[tuple[Quiet, float]] = []
         for witness in self.witnesses:
-            witness.examine(self.motion.wait, self._find_gravity)
-        candidates = [
-            (flight, float(witness.time[-1]))
-            for witness in self.witnesses
-            for flight in witness.flights
-        ]
-        all_flights = [flight for flight, _ in candidates]
+            witness.examine(self.find_wait, self._find_gravity)
+            last_time = float(witness.time[-1])
+            candidates += [(flight, last_time) for flight in witness.flights]
+        # If parts and the model show a flight at the same state, that of the parts comes first.
+        candidates.sort(key=lambda pair: pair[0].seen)
         chosen: list[Quiet] = []
-        for flight, last_time in sorted(candidates, key=lambda pair: pair[0].seen):
+        for flight, last_time in candidates:
             last_end = chosen[-1].end if chosen else -np.inf
-            if last_end is not None and flight.seen > last_end:
-                chosen.append(_find_end(flight, last_time, all_flights))
+            if last_end is None or flight.seen <= last_end:
+                continue
+            if flight.end is None:
+                # The evidence of the parts may end in the flight, as when they become rigid.
+                ends = (
+                    longer.end
+                    for longer, _ in candidates
+                    if longer.end and longer.start < last_time < longer.end
+                )
+                flight = flight._replace(end=next(ends, None))
+            chosen.append(flight)
         return tuple(chosen)
+
+    def find_wait(self, start: float, now: float) -> Wait | None:
+        """Return the waiting time for a flight since ``start``, from the states up to ``now``; None if unknown."""
+        longest = self.motion.longest(now)
+        if self.given is not None:
+            reason = "as given"
+            if longest is not None and longest.time > self.given:
+                reason = f"as given, but {longest.reason}"
+            return Wait(self.given, "given", reason)
+        first_times = self.history.time[:FEWEST]
+        begins_free = first_times.size == FEWEST and start <= first_times[-1]
+        if begins_free and self._stores_no_energy(start, now):
+            reason = f"nothing vibrates: {FEWEST} states are enough"
+            return Wait(float(np.ptp(first_times)), "at-rest", reason)
+        return None if self.motion.is_unfinished(now) else longest
+
+    def _stores_no_energy(self, start: float, now: float) -> bool:
+        """Return True if the internal energy is round-off in a span, compared with the kinetic energy if written."""
+        history = self.history
+        internal = np.abs(history.between(start, now)[1]).max()
+        balance, kinetic = history.balance, 0.0
+        if balance is not None and balance.kinetic is not None:
+            inside = find_window(balance.time, start, now)
+            kinetic = balance.kinetic[inside].max(initial=0.0)
+        return bool(internal <= _ROUND_OFF * kinetic)
 
     def _find_gravity(
         self, witness: GrowingWitness, first: int, last: int
@@ -177,8 +198,8 @@ class GrowingEvidence:
             return 0.0
         momenta = history.find_momenta(of_parts=witness.parts is not None)
         assert momenta is not None
-        times = witness.time[[0, first, last]]
-        begin, start, end = np.searchsorted(momenta.time, times).tolist()
+        begin = int(np.searchsorted(momenta.time, witness.time[0]))
+        start, end = begin + first, begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
@@ -189,7 +210,7 @@ class GrowingEvidence:
     def free_since(self, time: float) -> float:
         """Return the start of the force-free time that lasts up to a time; if there are no states, return that time."""
         starts = [time]
-        for witness in self._witnesses:
+        for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
             if state >= 0 and time <= witness.time[-1]:
                 starts.append(float(witness.time[witness.free[state]]))
@@ -197,8 +218,9 @@ class GrowingEvidence:
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
         """Return all force-free times that ended after ``since`` without being detected as flights [time]."""
-        for witness in sorted(self._going_on.values(), key=_is_of_model):
-            return tuple(pause for pause in witness.pauses if pause[1] > since)
+        for witness in self.witnesses:
+            if self._going_on.get(witness.parts) is witness:
+                return tuple(pause for pause in witness.pauses if pause[1] > since)
         return ()
 
     def find_contact(self, fewest: int = FEWEST) -> float | None:
@@ -213,44 +235,17 @@ class GrowingEvidence:
                 return contacts[0] if contacts else None
         return None
 
-    def find_rigid_times(self) -> list[tuple[float, float, float]]:
-        """Return the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
+    def find_rigid_times(self) -> Iterator[tuple[float, ...]]:
+        """Yield the periods in which the part momenta were those of rigid bodies: start, detection and end [time].
 
         The last of these periods may last to the end of the record.
         """
         momenta = self.history.find_momenta(of_parts=True)
-        if momenta is None:
-            return []
-        rigid_times = []
         for stretch in find_stretches(self._complete.rows == 0, FEWEST):
+            assert momenta is not None
             end = min(stretch.stop, momenta.time.size - 1)
             states = [stretch.start, stretch.start + FEWEST - 1, end]
-            rigid_times.append(tuple(momenta.time[states].tolist()))
-        return rigid_times
-
-
-def highest_energy(history: History, start: float, end: float) -> float:
-    """Return the last time from ``start`` to ``end`` at which the internal energy has its maximum [time]."""
-    time, energy = history.between(start, end)
-    return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
-
-
-def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
-    """Return a flight that its own data show up to ``last_time``, with the end that other data show."""
-    if flight.end is not None:
-        return flight
-    ends = (
-        other_flight.end
-        for other_flight in flights
-        if other_flight.end is not None
-        and other_flight.start < last_time < other_flight.end
-    )
-    return flight._replace(end=next(ends, None))
-
-
-def _is_of_model(witness: GrowingWitness) -> bool:
-    """Return True if the evidence concerns the whole model; such evidence is used after the evidence for parts."""
-    return witness.parts is None
+            yield tuple(momenta.time[states].tolist())
 
 
 def _sample_states(first: int, last: int) -> Samples:
@@ -258,16 +253,22 @@ def _sample_states(first: int, last: int) -> Samples:
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
 
 
-def _make_columns(time: Samples, momentum: Samples, balance: Balance | None) -> Samples:
-    """Return time, contact energy and momentum as columns (k, 5); the energy is NaN if it is not written."""
-    contact = np.full(time.size, np.nan)
-    if (
-        balance is not None
-        and balance.sliding is not None
-        and balance.time.size == time.size
-    ):
-        contact = balance.sliding
-    return np.column_stack([time, contact, momentum])
+def _make_columns(
+    members: Sequence[int], momenta: Momenta | None, contact: Balance | None
+) -> Samples:
+    """Return time, contact energy and momentum as columns (k, 5); an energy that is not written is NaN.
+
+    The momentum is that of the ``members`` of the momenta, or zero if there are none.
+    """
+    table = momenta or contact
+    if table is None:
+        return np.empty((0, 5))
+    columns = np.full((table.time.size, 5), np.nan)
+    columns[:, 0] = table.time
+    if contact is not None and contact.time.size == table.time.size:
+        columns[:, 1] = contact.sliding
+    columns[:, 2:] = momenta.of(members) if momenta else 0.0
+    return columns
 
 
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
@@ -278,7 +279,8 @@ def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
     assert momenta.parts is not None
     ids = [part.id for part in momenta.parts]
     joined = {ids[number] for number in momenta.flying or momenta.chosen}
-    bodies = [{*body} for body in momenta.surroundings.bodies()]
-    joined = joined.union(*(body for body in bodies if body & joined))
+    for body in momenta.surroundings.bodies():
+        if not joined.isdisjoint(body):
+            joined.update(body)
     body_numbers = tuple(number for number, part in enumerate(ids) if part in joined)
     return body_numbers, tuple(range(len(ids)))

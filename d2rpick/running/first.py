@@ -6,7 +6,7 @@ switch sets with CODE 2 (no contact force) and 4 (contact force), from published
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
@@ -25,16 +25,8 @@ from d2rpick.deck.radioss_deck import find_bodies_kept_off
 from d2rpick.deck.radioss_run import find_parts_off, read_run
 from d2rpick.deck.radioss_sensors import list_forces
 from d2rpick.deck.reader import read_deck
-from d2rpick.deck.sensor_cards import (
-    write_any_of,
-    write_force_sensor,
-    write_sensor_of_sensors,
-    write_time_sensor,
-)
-from d2rpick.deck.switch_sets import (
-    Waiting,
-    write_set_pair,
-)
+from d2rpick.deck.sensor_cards import write_flight_sensors
+from d2rpick.deck.switch_sets import Waiting, write_set_pair
 from d2rpick.running.checks import NO_CONTACT, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
@@ -42,8 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.model import Inventory
-    from d2rpick.deck.radioss_bodies import SwitchedBodies
-    from d2rpick.deck.radioss_run import RadiossRun
     from d2rpick.deck.reader import Deck
 
 # Number of engine files from which the OpenRadioss starter reads /RBODY/OFF.
@@ -75,6 +65,12 @@ _OF_LS_DYNA: Final = (
     "These switches do not react to other contacts, rigid walls and loads.",
     "These cards were not tested with the solver.",
 )
+_AT_REST: Final = "In free fall from rest: rigid from 0, TIME1 0."
+_OF_LOAD: Final = "TIME1 is 0: if you know the end of the load, give it (--after)."
+_WITHOUT_OFFSET: Final = (
+    "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells"
+    " have a margin."
+)
 # _PUSHES: prefixes of the LS-DYNA keywords of loads that are no contact forces.
 # _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
@@ -83,20 +79,12 @@ _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
 _OFFSET_THICKNESSES: Final = 2
 
 
-class First(NamedTuple):
-    """A card for the first run, its waiting time (the force-free time that shows a flight), and notes for the user."""
-
-    card: PrintedCard
-    wait: Wait
-    notes: tuple[str, ...]
-
-
 def first_card(
     path: str,
     parts: Collection[int] = (),
     wait: float | None = None,
     after: float | None = None,
-) -> First:
+) -> tuple[PrintedCard, Wait]:
     """Print the cards with which the first run of a deck switches its parts by itself.
 
     Parameters
@@ -109,6 +97,11 @@ def first_card(
         Force-free time that shows a flight [time]; by default half of the longest period of the deck's springs.
     after : float, optional
         No part becomes rigid before this time [time].
+
+    Returns
+    -------
+    (PrintedCard, Wait)
+        The card, with notes for the user, and its waiting time (the force-free time that shows a flight).
 
     Raises
     ------
@@ -128,10 +121,11 @@ def first_card(
             f"no parts were given, and {path} keeps no body off; name them with `parts`"
         )
     refuse_held(path, inventory, chosen)
-    reasoned_wait = _choose_wait(path, inventory, wait)
+    needed = _choose_wait(path, inventory, wait)
+    make_card = _make_ls_dyna_card
     if inventory.solver == "radioss":
-        return _make_radioss_card(path, inventory, chosen, reasoned_wait, after)
-    return _make_ls_dyna_card(path, inventory, chosen, reasoned_wait, after)
+        make_card = _make_radioss_card
+    return make_card(path, inventory, chosen, needed, after), needed
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
@@ -157,7 +151,7 @@ def _make_radioss_card(
     parts: Sequence[int],
     wait: Wait,
     after: float | None,
-) -> First:
+) -> PrintedCard:
     """Print the engine files and sensors of a Radioss run; raise DeckError if contact forces cannot show a flight."""
     run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
@@ -169,76 +163,34 @@ def _make_radioss_card(
     contacts = list_forces(run.starter)
     if not contacts:
         raise DeckError(f"{path}: {NO_CONTACT}")
-    starts_moving = run.starter.named("INIVEL") or any(leg.starts for leg in run.legs)
+    (leg,) = run.legs
+    starts_moving = run.starter.named("INIVEL") or leg.starts
     at_rest = after is None and bool(inventory.boundary.gravity) and not starts_moving
-    first_switch = wait.time if after is None else max(after, wait.time)
-    sensors = _write_sensors(contacts, wait.time, first_switch, bodies.sensor)
+    sensors, contact, flight = write_flight_sensors(
+        contacts, wait.time, max(after or 0.0, wait.time), bodies.sensor
+    )
     largest_step = float(f"{wait.time / _STEPS_PER_WAIT:.2g}")
-    files = _write_legs(run, bodies, sensors, largest_step, at_rest=at_rest)
+    other_nodes = [
+        node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
+    ]
+    files = {}
+    # The engine runs are alternately deformable and rigid; the first one is rigid if the parts fall from rest.
+    for number in range(1, _MOST_LEGS + 1 - at_rest):
+        rigid = number % 2 == at_rest
+        file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
+        lines = [*write_engine_lines(file, leg.name, bodies.nodes, other_nodes)]
+        if number < _MOST_LEGS - at_rest:
+            lines += ["/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0"]
+        files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     reason = _explain_wait(wait)
     if at_rest:
         reason = f"in free fall from rest: rigid from 0; then {reason}"
     of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
-    of_walls = (_OF_WALLS,) if run.starter.named("RWALL") else ()
-    notes = (reason, *bodies.notes, *_OF_ALL, *of_radioss, *of_walls)
+    notes = [reason, *bodies.notes, *_OF_ALL, *of_radioss]
+    if run.starter.named("RWALL"):
+        notes.append(_OF_WALLS)
     head = "".join(f"# {line}\n" for line in write_comments([*notes, *PHYSICS]))
-    card = PrintedCard(head, (), files, starter=bodies.cards + sensors.text)
-    return First(card, wait, notes)
-
-
-class _Sensors(NamedTuple):
-    """The sensor cards, the id of the sensor that detects a contact force, and that of the sensor for a flight."""
-
-    text: str
-    contact: int
-    flight: int
-
-
-def _write_sensors(
-    contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
-) -> _Sensors:
-    """Write a sensor that detects a contact force within the waiting time, and a sensor that detects a flight."""
-    forces = [
-        write_force_sensor(number, *contact, wait)
-        for number, contact in enumerate(contacts, start=first_id)
-    ]
-    ids = range(first_id, first_id + len(contacts))
-    combined, any_force = write_any_of(ids, "any force")
-    no_force, late_enough, flight = range(any_force + 1, any_force + 4)
-    cards = [
-        *forces,
-        combined,
-        write_sensor_of_sensors("NOT", no_force, "no force", any_force),
-        write_time_sensor(late_enough, "from then on", first_switch),
-        write_sensor_of_sensors("AND", flight, "flight", no_force, late_enough),
-    ]
-    return _Sensors("".join(cards), any_force, flight)
-
-
-def _write_legs(
-    run: RadiossRun,
-    bodies: SwitchedBodies,
-    sensors: _Sensors,
-    largest_step: float,
-    *,
-    at_rest: bool,
-) -> dict[str, str]:
-    """Write the engine files, alternately deformable and rigid. The first one is rigid if the parts fall from rest."""
-    (leg,) = run.legs
-    other_nodes = [
-        node for node in find_bodies_kept_off(run.legs) if node not in bodies.nodes
-    ]
-    leg_count = _MOST_LEGS - at_rest
-    files = {}
-    for number in range(1, leg_count + 1):
-        rigid = number % 2 == at_rest
-        file = EngineFile(number, leg.stop.value, largest_step if rigid else None)
-        lines = [*write_engine_lines(file, leg.name, bodies.nodes, other_nodes)]
-        if number < leg_count:
-            sensor = sensors.contact if rigid else sensors.flight
-            lines += ["/STOP/LSENSOR", str(sensor), "0 0 0 0 0 0"]
-        files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
-    return files
+    return PrintedCard(head, (), files, tuple(notes), bodies.cards + sensors)
 
 
 def _explain_wait(wait: Wait) -> str:
@@ -255,23 +207,18 @@ def _make_ls_dyna_card(
     parts: Sequence[int],
     wait: Wait,
     after: float | None,
-) -> First:
+) -> PrintedCard:
     """Print the switch sets of an LS-DYNA run; raise DeckError if the force of one contact cannot show a flight."""
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)
     printing = Printing(part=tuple(part_ids), bodies=inventory.bodies(part_ids))
-    rigid_set, deformable_set = printing.swset
     offset, offset_note = _choose_offset(inventory, keyword)
-    notes = [_explain_wait(wait)]
-    falls_from_rest = bool(inventory.boundary.gravity) and not deck.named(
-        "INITIAL_VELOCITY"
-    )
-    if after is None and falls_from_rest:
-        notes.append("In free fall from rest: rigid from 0, TIME1 0.")
-    notes += [*_OF_ALL, *_OF_LS_DYNA, offset_note]
-    if after is None and not falls_from_rest:
-        notes.append("TIME1 is 0: if you know the end of the load, give it (--after).")
+    notes = [_explain_wait(wait), *_OF_ALL, *_OF_LS_DYNA, offset_note]
+    if after is None:
+        starts_moving = deck.named("INITIAL_VELOCITY")
+        at_rest = bool(inventory.boundary.gravity) and not starts_moving
+        notes.append(_AT_REST if at_rest else _OF_LOAD)
     delay = wait.time / _DELAYS_PER_WAIT
     lines = [f"$ {line}" for line in write_comments([*notes, *PHYSICS])]
     lines += write_set_pair(
@@ -281,12 +228,12 @@ def _make_ls_dyna_card(
         part_ids,
         printing,
         waits=(
-            Waiting(2, contact, delay, deformable_set, 1),
-            Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
+            Waiting(2, contact, delay),
+            Waiting(4, contact, wait.time, offset=offset),
         ),
     )
     text = "\n".join(lines) + "\n"
-    return First(PrintedCard(text, (), {"switches.k": text}), wait, tuple(notes))
+    return PrintedCard(text, (), {"switches.k": text}, tuple(notes))
 
 
 def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
@@ -296,31 +243,23 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
             raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
     entities = read_entities(deck, "CONTACT")
     contacts = [contact for contact in entities.found if contact.triggers]
-    if not entities.all_known or len(contacts) != 1:
-        count = "contacts that are not all known"
-        if entities.all_known:
-            count = f"{len(contacts)} contacts"
-        raise DeckError(
-            f"{path}: {count} between surfaces, or of nodes with a surface; one was expected: a switch waits for one,"
-            " and single-surface contacts never trigger it"
-        )
-    return contacts[0].id or contacts[0].number, contacts[0].keyword
+    if entities.all_known and len(contacts) == 1:
+        return contacts[0].id or contacts[0].number, contacts[0].keyword
+    count = len(contacts) if entities.all_known else "unknown"
+    raise DeckError(
+        f"{path}: {count} contacts between surfaces, or of nodes with a surface; one was expected: a switch waits for"
+        " one, and single-surface contacts never trigger it"
+    )
 
 
 def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
     """Return the gap between the surfaces at which the parts become deformable again [length], with a note."""
-    sections = [part.section for part in inventory.parts.values()]
-    thickest = max(
-        (section.thickness for section in sections if section.thickness), default=0.0
-    )
-    if keyword.startswith("CONTACT_AUTOMATIC_") and thickest > 0:
-        offset = float(write_number(_OFFSET_THICKNESSES * thickest))
-        note = (
-            f"OFFSET {offset:g}: the parts are deformable before the contact, "
-            f"{_OFFSET_THICKNESSES} shell thicknesses from it."
-        )
-        return offset, note
-    return (
-        0.0,
-        "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells have a margin.",
+    thicknesses = [part.section.thickness for part in inventory.parts.values()]
+    thickest = max((thickness or 0.0 for thickness in thicknesses), default=0.0)
+    if not keyword.startswith("CONTACT_AUTOMATIC_") or thickest <= 0:
+        return 0.0, _WITHOUT_OFFSET
+    offset = float(write_number(_OFFSET_THICKNESSES * thickest))
+    return offset, (
+        f"OFFSET {offset:g}: the parts are deformable before the contact, "
+        f"{_OFFSET_THICKNESSES} shell thicknesses from it."
     )

@@ -8,21 +8,22 @@ shorter wait treats such a gap as a flight, and a body frozen in it cannot rebou
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import find_inner_period
-from d2rpick.flight.window import FEWEST
-from d2rpick.histories.samples import find_window
 from d2rpick.running.record import GrowingColumn, RunningMaximum
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
+
+    # Slices of the latest states, each with the columns of the parts that move in it.
+    MovingParts = Sequence[tuple[slice, Sequence[int]]]
 
 # Smallest velocity change that is an oscillation, as a fraction of the velocity range so far [-].
 _SWING: Final = 1 / 3
@@ -44,8 +45,6 @@ _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
 _EXACT: Final = 0.9
 # Smallest mass fraction of parts that are considered [-], because lighter parts hardly move the other parts.
 _HEAVY: Final = 0.05
-# Largest internal energy that is only round-off and shows no vibration, relative to the largest energy [-].
-_ROUND_OFF: Final = 1e-6
 
 
 class Wait(NamedTuple):
@@ -62,11 +61,12 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an internal motion, from ``begin`` to ``end``, detected at ``seen_at`` [time].
+    """Half a period of an internal ``motion``, from ``begin`` to ``end``, detected at the time ``seen_at`` [time].
 
     ``half`` is half of its period [time], ``strength`` its mean change by time.
     """
 
+    motion: _Motion
     begin: float
     end: float
     seen_at: float
@@ -92,57 +92,48 @@ class _Motion:
         # State at the last extremum, state at the extreme value since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
-    def covers(self, now: float) -> bool:
-        """Return True if a time is between the first and the last state."""
-        time = self._columns.rows[:, 0]
-        return bool(time[0] <= now <= time[-1])
-
     def add(
         self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
         """Append states (k,), and return the half periods that they complete, if larger than ``least_swing`` (k,)."""
         ranges = self._highest.add(values) + self._lowest.add(-values)
         limits = np.maximum(_SWING * ranges, least_swing)
-        first = self._columns.size
-        self._columns.add(np.column_stack([time, values, limits]))
-        rows = self._columns.rows
+        rows = self._columns.add(np.column_stack([time, values, limits]))
+        first = len(rows) - len(time)
         if not self._swings:
             moved = np.flatnonzero(ranges > limits)
             if not moved.size:
                 return
             first += int(moved[0])
-            self._begin(first)
-        for state, (_, value, limit) in enumerate(rows[first:].tolist(), start=first):
+            self._begin(rows[: first + 1])
+        for state, (now, value, limit) in enumerate(rows[first:].tolist(), start=first):
             beyond_extreme = self._sign * (value - rows[self._extreme, 1])
             if beyond_extreme >= 0:
                 self._extreme = state
             elif -beyond_extreme > limit:
                 if self._extreme - self._turn >= _FEWEST_STATES:
-                    yield self._measure(state)
+                    yield self._measure(rows[self._turn : self._extreme + 1], now)
                 self._turn, self._extreme = self._extreme, state
                 self._sign = -self._sign
 
-    def _begin(self, state: int) -> None:
-        """Begin to follow the motion, which is first detected at a state."""
-        time, values, _ = self._columns.rows[: state + 1].T
-        distance = np.abs(values - values[-1])
-        self._turn = int(np.flatnonzero(distance == distance.max())[-1])
-        self._extreme = state
-        self._sign = 1 if values[-1] > values[self._turn] else -1
-        now = float(time[-1])
-        self._swings.append(_HalfPeriod(now, now, now))
+    def _begin(self, rows: Samples) -> None:
+        """Begin to follow the motion, which is first detected at the last of its states."""
+        distance = np.abs(rows[:, 1] - rows[-1, 1])
+        self._extreme = len(rows) - 1
+        self._turn = self._extreme - int(np.argmax(distance[::-1]))
+        self._sign = int(np.sign(rows[-1, 1] - rows[self._turn, 1]))
+        now = float(rows[-1, 0])
+        self._swings.append(_HalfPeriod(self, now, now, now))
 
-    def _measure(self, state: int) -> _HalfPeriod:
-        """Measure the half period from the last extremum to the extreme value; it is detected at a later state."""
-        time, values, _ = self._columns.rows[self._turn : state + 1].T
-        end = self._extreme - self._turn
-        distance = np.abs(values[: end + 1] - values[0])
+    def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
+        """Measure the half period from the last extremum to the extreme value, as detected ``now``."""
+        time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
         low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
         high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
         half = self._factor * float(time[high] - time[low]) / _INNER_TIME
-        begin, end_time, now = time[[0, end, -1]].tolist()
         strength = float(distance[-1]) / half
-        self._swings.append(_HalfPeriod(begin, end_time, now, half, strength))
+        begin, end = time[[0, -1]].tolist()
+        self._swings.append(_HalfPeriod(self, begin, end, now, half, strength))
         return self._swings[-1]
 
     def outlasts_earlier_swings(self, now: float, least_strength: float) -> bool:
@@ -154,71 +145,49 @@ class _Motion:
         if not swings:
             return False
         time, values, limits = self._columns.rows.T
+        if now > time[-1]:
+            return False
         begin, state = np.searchsorted(time, [swings[-1].end, now]).tolist()
         earlier_values = values[[begin, (begin + state) // 2]]
         change, late_change = np.abs(values[state] - earlier_values).tolist()
         duration = self._factor * (now - swings[-1].end)
         longest_half = max(swing.half for swing in swings)
-        is_rest = change <= limits[state] or late_change <= limits[state] / 2
-        is_rotation = change < least_strength * duration
         return (
-            not is_rest and not is_rotation and duration > _MUCH_LONGER * longest_half
+            duration > _MUCH_LONGER * longest_half
+            and change > max(limits[state], least_strength * duration)
+            and late_change > limits[state] / 2
         )
 
 
-class EvidenceOfForces(Protocol):
-    """The part of the evidence of a growing record that is needed to follow internal motion."""
-
-    # Slices of the latest states, each with the columns of the parts that move in it; empty if there are no momenta.
-    moving: list[tuple[slice, tuple[int, ...]]]
-
-    @property
-    def history(self) -> History:
-        """All states read so far."""
-
-    def free_since(self, time: float) -> float:
-        """Return when the force-free time that lasts up to a time began [time]."""
-
-
 class _Longest(NamedTuple):
-    """The longest half period of the internal motion so far [time], and the part or energy that showed it.
+    """The longest half period of the internal motion so far, as the ``wait`` for which it asks; None if there is none.
 
-    ``since`` is the time of detection, ``over`` the end of the half period. ``strength`` is the largest mean rate of
-    change so far. ``swing`` is half of the longest swing, even if a force pushed the swing [time].
+    ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
+    the longest swing, even if a force pushed the swing [time].
     """
 
     since: float
-    half: float = 0.0
+    wait: Wait | None = None
     strength: float = 0.0
-    name: str = ""
-    over: float = 0.0
     swing: float = 0.0
 
 
 class InnerMotion:
-    """The waiting time at each state of a record, from the internal motion up to that state.
+    """The internal motion up to each state of a record, and the longest half period that it has shown.
 
-    ``evidence`` shows which parts move, and since when no force has acted.
-    ``given`` is the user's waiting time, ``of_deck`` the deck's, ``before`` that of earlier flights [time].
+    ``of_deck`` is the deck's waiting time, ``before`` that of earlier flights [time].
     """
 
-    def __init__(
-        self,
-        evidence: EvidenceOfForces,
-        given: float | None = None,
-        of_deck: Wait | None = None,
-        before: float = 0.0,
-    ) -> None:
-        self._evidence = evidence
-        self._given, self._least = given, of_deck
-        self._half_of_springs = of_deck.time if of_deck else np.inf
-        if before > (of_deck.time if of_deck else 0.0):
+    def __init__(self, of_deck: Wait | None = None, before: float = 0.0) -> None:
+        time_of_deck = of_deck.time if of_deck else 0.0
+        self._half_of_springs = time_of_deck or np.inf
+        self._least, self._least_time = of_deck, max(before, time_of_deck)
+        if before > time_of_deck:
             self._least = Wait(before, "record", "as in the flight before")
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
-        self._part_motions: list[_Motion] = []
-        # Motions that still continue, keyed by the indices of part and axis.
-        self._going_on: dict[tuple[int, int], _Motion] = {}
-        self._heavy: tuple[int, ...] = ()
+        # Motions of parts, keyed by the number of times without motion before and the indices of part and axis.
+        self._part_motions: dict[tuple[int, int, int], _Motion] = {}
+        self._rest_count = 0
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
         # Time from which the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
@@ -226,109 +195,85 @@ class InnerMotion:
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
-    def take(self, states: History) -> None:
-        """Append states that the evidence already contains."""
+    def take(
+        self,
+        states: History,
+        moving_parts: MovingParts,
+        free_since: Callable[[float], float],
+    ) -> None:
+        """Append states. ``free_since`` returns when the force-free time that lasts up to a time began [time]."""
         momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
-            swings = self._follow_parts(momenta, momenta.masses)
-            for swing, motion in sorted(swings, key=lambda pair: pair[0].seen_at):
-                self._learn(swing, motion, self._longest_of_parts)
+            swings = self._follow_parts(momenta, momenta.masses, moving_parts)
+            self._learn(swings, self._longest_of_parts, free_since)
         least_swing = _AT_REST * self._largest_energy.add(np.abs(states.energy))
-        for swing in self._energy.add(states.time, states.energy, least_swing):
-            self._learn(swing, self._energy, self._longest_of_energy)
+        swings = self._energy.add(states.time, states.energy, least_swing)
+        self._learn(swings, self._longest_of_energy, free_since)
 
     def _follow_parts(
-        self, momenta: Momenta, masses: Samples
-    ) -> Iterator[tuple[_HalfPeriod, _Motion]]:
+        self, momenta: Momenta, masses: Samples, moving_parts: MovingParts
+    ) -> Iterator[_HalfPeriod]:
         """Follow the momenta of heavy parts relative to the centre of mass of all moving parts."""
-        for states, moving in self._evidence.moving:
+        assert momenta.parts is not None
+        for states, moving in moving_parts:
             members = [number for number in moving if masses[number] > 0]
-            whole = float(masses[members].sum())
-            heavy = tuple(
-                number
-                for number in members
-                if _HEAVY < masses[number] / whole < 1 - _HEAVY
-            )
-            if heavy != self._heavy:
-                self._going_on.clear()
-            self._heavy = heavy
-            if not heavy:
+            shares = masses[members] / masses[members].sum()
+            is_heavy = (shares > _HEAVY) & (shares < 1 - _HEAVY)
+            if not is_heavy.any():
+                self._rest_count += 1
                 continue
             time = momenta.time[states]
             self._parts_since = min(self._parts_since, float(time[0]))
-            velocity = momenta.values[states][:, members].sum(axis=1) / whole
+            momentum = momenta.values[states][:, members]
+            velocity = momentum.sum(axis=1) / masses[members].sum()
             speeds = self._largest_speed.add(np.abs(velocity).max(axis=1))
-            for number in heavy:
+            for number in np.array(members)[is_heavy].tolist():
                 relative = momenta.values[states, number] - masses[number] * velocity
                 least_swing = masses[number] * _AT_REST * speeds
                 for axis, values in enumerate(relative.T):
-                    motion = self._get_motion(momenta, number, axis)
-                    for swing in motion.add(time, values, least_swing):
-                        yield swing, motion
-
-    def _get_motion(self, momenta: Momenta, number: int, axis: int) -> _Motion:
-        """Return the motion of a part along an axis. A part that starts to move or deforms again gets a new motion."""
-        assert momenta.parts is not None
-        if (number, axis) not in self._going_on:
-            motion = _Motion(momenta.parts[number].name)
-            self._going_on[number, axis] = motion
-            self._part_motions.append(motion)
-        return self._going_on[number, axis]
+                    key = self._rest_count, number, axis
+                    name = momenta.parts[number].name
+                    motion = self._part_motions.setdefault(key, _Motion(name))
+                    yield from motion.add(time, values, least_swing)
 
     def _learn(
-        self, swing: _HalfPeriod, motion: _Motion, so_far: list[_Longest]
+        self,
+        swings: Iterable[_HalfPeriod],
+        so_far: list[_Longest],
+        free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time if a completed half period requires it and was neither a rotation nor pushed.
+        """Lengthen the waiting time by completed half periods that were neither a rotation nor pushed.
 
         A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """
-        longest = so_far[-1]
-        strongest = max(longest.strength, swing.strength)
-        longest = longest._replace(since=swing.seen_at, strength=strongest)
-        is_free = self._evidence.free_since(swing.end) <= swing.begin
-        motion.has_free_swing |= is_free
-        is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
-        if swing.strength >= _ROTATION * strongest and not is_too_long:
+        for swing in sorted(swings, key=lambda swing: swing.seen_at):
+            motion = swing.motion
+            is_free = free_since(swing.end) <= swing.begin
+            motion.has_free_swing |= is_free
+            strongest = max(so_far[-1].strength, swing.strength)
+            longest = so_far[-1]._replace(since=swing.seen_at, strength=strongest)
+            so_far.append(longest)
+            is_too_long = is_free and swing.half > _LONGEST_FREE * self._half_of_springs
+            if swing.strength < _ROTATION * strongest or is_too_long:
+                continue
             half = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
             longest = longest._replace(swing=max(longest.swing, half))
             counts = is_free or not (motion.has_free_swing or self._least)
-            if counts and swing.half > longest.half:
-                longest = longest._replace(
-                    half=swing.half, name=motion.name, over=swing.seen_at
-                )
-        so_far.append(longest)
-
-    def wait(self, start: float, now: float) -> Wait | None:
-        """Return the waiting time for a flight since ``start``, from the states up to ``now``; None if unknown."""
-        longest = self.longest(now)
-        if self._given is not None:
-            reason = "as given"
-            if longest is not None and longest.time > self._given:
-                reason = f"as given, but {longest.reason}"
-            return Wait(self._given, "given", reason)
-        if self._is_at_rest(start, now):
-            time = self._evidence.history.time
-            return Wait(
-                float(time[FEWEST - 1] - time[0]),
-                "at-rest",
-                f"nothing vibrates: {FEWEST} states are enough",
-            )
-        if self._least is None and self._has_long_ongoing_swing(now):
-            return None
-        return longest
+            if counts and (longest.wait is None or swing.half > longest.wait.time):
+                reason = f"{motion.name} took {swing.half:.3g} for half a period, until {swing.seen_at:.6g}"
+                longest = longest._replace(wait=Wait(swing.half, "record", reason))
+            so_far[-1] = longest
 
     def longest(self, now: float) -> Wait | None:
         """Return the longest half period known at the time ``now``, from the deck or from the record so far."""
-        longest = self._get_longest(now)
-        if longest.half <= (self._least.time if self._least else 0.0):
+        wait = self._get_longest(now).wait
+        if wait is None or wait.time <= self._least_time:
             return self._least
-        reason = f"{longest.name} took {longest.half:.3g} for half a period, until {longest.over:.6g}"
-        return Wait(longest.half, "record", reason)
+        return wait
 
     def longest_swing(self, now: float) -> float:
         """Return the longest half period known at the time ``now``, even if a push lengthened it [time]."""
-        least = self._least.time if self._least else 0.0
-        return max(self._get_longest(now).swing, least)
+        return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:
         """Return the longest half period known at a time: from the parts, or from the energy while no part moves."""
@@ -336,29 +281,16 @@ class InnerMotion:
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]
 
-    def _is_at_rest(self, start: float, now: float) -> bool:
-        """Return True if no force has acted since the record began, and nothing vibrates."""
-        history = self._evidence.history
-        if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
+    def is_unfinished(self, now: float) -> bool:
+        """Return True if an oscillation still lasts, is much longer than all earlier ones, and there is no deck."""
+        if self._least is not None:
             return False
-        energies: list[Samples | None] = [history.energy]
-        if balance := history.balance:
-            energies += (balance.internal, balance.kinetic, balance.external_work)
-        inside = find_window(history.time, start, now)
-        largest = [
-            float(np.abs(energy[inside]).max())
-            for energy in energies
-            if energy is not None
-        ]
-        return largest[0] <= _ROUND_OFF * max(largest)
-
-    def _has_long_ongoing_swing(self, now: float) -> bool:
-        """Return True if an unfinished oscillation is already much longer than all earlier ones."""
         least_strength = _ROTATION * self._get_longest(now).strength
-        motions = [motion for motion in self._part_motions if motion.covers(now)]
+        motions = [self._energy]
+        if self._parts_since <= now:
+            motions = [*self._part_motions.values()]
         return any(
-            motion.outlasts_earlier_swings(now, least_strength)
-            for motion in motions or [self._energy]
+            motion.outlasts_earlier_swings(now, least_strength) for motion in motions
         )
 
 
@@ -376,7 +308,7 @@ def check_wait(given: float, longest: Wait | None, name: str) -> None:
     if longest is None:
         return
     shortest = longest.time if longest.least is None else longest.least
-    if shortest and given < _EXACT * shortest:
+    if given < _EXACT * shortest:
         raise RangeError(
             f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a known period: {longest.reason}; a gap in the "
             "load would be treated as flight, so give a longer one"

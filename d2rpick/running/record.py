@@ -7,19 +7,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.histories.history import Given, History, list_columns, select_states
+from d2rpick.histories.history import (
+    Given,
+    History,
+    Momenta,
+    list_columns,
+    select_states,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Balance, Momenta
+    from d2rpick.histories.history import Balance
 
     Table = History | Momenta | Balance
 
-# Number of rows for which a new column reserves memory.
-_FEWEST_ROWS: Final = 64
 # Smallest time difference of two different states, in units of the last printed digit [-].
 _APART: Final = 1.5
 # Tolerance for a value that is read twice, as a fraction of the largest value [-]; sums over parts may be rounded.
@@ -27,27 +31,22 @@ _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array to which rows are appended; it is copied only when its capacity is doubled."""
+    """An array to which ``rows`` are appended; it is copied only when its capacity is doubled."""
 
     def __init__(self) -> None:
-        self._room: NDArray[Any] = np.empty(0)
-        self.size = 0
+        self.rows: NDArray[Any] = np.empty(0)
+        self._room = self.rows
 
-    def add(self, rows: NDArray[Any]) -> None:
-        """Append ``rows`` of shape (k, ...)."""
-        size = self.size + len(rows)
+    def add(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Append ``rows`` of shape (k, ...), and return all rows so far as a view."""
+        first, size = len(self.rows), len(self.rows) + len(rows)
+        shape = rows.shape[1:]
         if size > len(self._room):
-            row_count = max(2 * size, _FEWEST_ROWS)
-            longer = np.empty((row_count, *rows.shape[1:]), rows.dtype)
-            longer[: self.size] = self.rows if self.size else 0
-            self._room = longer
-        self._room[self.size : size] = rows
-        self.size = size
-
-    @property
-    def rows(self) -> NDArray[Any]:
-        """All rows so far, as a view."""
-        return self._room[: self.size]
+            self._room = np.empty((2 * size, *shape), rows.dtype)
+            self._room[:first] = self.rows.reshape(first, *shape)
+        self._room[first:size] = rows
+        self.rows = self._room[:size]
+        return self.rows
 
 
 class RunningMaximum:
@@ -68,31 +67,31 @@ class GrowingRecord:
     """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 
     def __init__(self) -> None:
-        self._latest_tables: list[Table] = []
         # Columns, keyed by the number of their table and by their name.
         self._columns: dict[tuple[int, str], GrowingColumn] = {}
-        self._history: History | None = None
+        self.history: History | None = None
 
-    def add(self, states: History) -> None:
-        """Append states, which must have the same quantities as the states so far."""
-        self._latest_tables = _list_tables(states)
-        for number, table in enumerate(self._latest_tables):
+    def extend(self, states: History) -> History | None:
+        """Append the states after the known ones, and return them; None if the last known states are not among them."""
+        tables = _list_tables(states)
+        known_tables: list[Any] = [None] * len(tables)
+        if self.history:
+            known_tables = _list_tables(self.history)
+        if len(tables) != len(known_tables):
+            return None
+        selected_tables = map(_select_new_states, tables, known_tables)
+        new_tables = [table for table in selected_tables if table is not None]
+        if len(new_tables) < len(tables):
+            return None
+        whole_tables = []
+        for number, table in enumerate(new_tables):
+            columns: dict[str, Any] = {}
             for name, rows in list_columns(table).items():
-                self._columns.setdefault((number, name), GrowingColumn()).add(rows)
-        self._history = None
-
-    @property
-    def history(self) -> History:
-        """All states as one history; at least one state must exist."""
-        if self._history is None:
-            columns: list[dict[str, Any]] = [{} for _ in self._latest_tables]
-            for (number, name), column in self._columns.items():
-                columns[number][name] = column.rows
-            pairs = zip(self._latest_tables, columns, strict=True)
-            self._history = _join_tables(
-                [replace(table, **rows) for table, rows in pairs]
-            )
-        return self._history
+                column = self._columns.setdefault((number, name), GrowingColumn())
+                columns[name] = column.add(rows)
+            whole_tables.append(replace(table, **columns))
+        self.history = _join_tables(whole_tables)
+        return _join_tables(new_tables)
 
 
 def _list_tables(history: History) -> list[Table]:
@@ -112,60 +111,37 @@ def _join_tables(tables: Sequence[Any]) -> History:
     return joined
 
 
-def hold_back_states(history: History) -> History:
-    """Remove the last state of a history, if a later state with the same printed time may still replace it."""
-    return _join_tables([_drop_unsettled(table) for table in _list_tables(history)])
+def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
+    """Return the states of a table after the last known one; None if the table lacks this state or has changed it.
 
-
-def _drop_unsettled(table: Table) -> Table:
-    """Remove the last state of a table if its last two times are as close as printed times can be."""
-    if isinstance(table, History):
-        precision = table.time_precision
-    else:
-        precision = table.precision
-    last_times = table.time[-2:].tolist()
-    quantum = precision.quantum(last_times[-1]) if last_times else 0.0
-    if len(last_times) < 2 or last_times[1] - last_times[0] > _APART * quantum:
-        return table
-    return select_states(table, slice(-1))
-
-
-def find_last_states(history: History, before: Sequence[Table]) -> list[Table]:
-    """Return the last state of each table of a history; for an empty table, the last state of that table ``before``."""
-    last_states: list[Table] = []
-    tables = _list_tables(history)
-    for table, last_state in zip(tables, before or tables, strict=True):
-        latest = table if table.time.size else last_state
-        last_states.append(select_states(latest, slice(-1, None)))
-    return last_states
-
-
-def skip_states(history: History, last_states: Sequence[Table]) -> History | None:
-    """Return the states of a history after the known last states; None if the history does not contain these.
-
-    ``last_states`` are those of `find_last_states`, one for each table; [] if none was known.
+    The last state is left out if a later state with the same printed time may still replace it.
     """
-    tables = _list_tables(history)
-    if len(tables) != len(last_states):
+    new_states = slice(0, table.time.size - _is_unsettled(table))
+    if known_table is None or not known_table.time.size:
+        return select_states(table, new_states)
+    count = int(np.searchsorted(table.time, known_table.time[-1], side="right"))
+    columns, known_columns = list_columns(table), list_columns(known_table)
+    if count == 0 or columns.keys() != known_columns.keys():
         return None
-    new_tables: list[Table] = []
-    for table, last_state in zip(tables, last_states, strict=True):
-        last_time = last_state.time.max(initial=-np.inf)
-        count = int(np.searchsorted(table.time, last_time, side="right"))
-        if last_state.time.size and not _contains(table, count - 1, last_state):
-            return None
-        new_tables.append(select_states(table, slice(count, None)))
-    return _join_tables(new_tables)
-
-
-def _contains(table: Table, state: int, last_state: Table) -> bool:
-    """Return True if a state of a table has the values of the last known state; ``state`` may be -1 for no state."""
-    columns, last_values = list_columns(table), list_columns(last_state)
-    if state < 0 or columns.keys() != last_values.keys():
-        return False
     for name, rows in columns.items():
         tolerance = _SAME * float(np.nanmax(np.abs(rows), initial=0.0))
-        value, last_value = rows[state], last_values[name][0]
-        if not np.allclose(value, last_value, rtol=0, atol=tolerance, equal_nan=True):
-            return False
-    return True
+        change = np.abs(rows[count - 1] - known_columns[name][-1])
+        if np.any(change > tolerance):
+            return None
+    selected = select_states(table, slice(count, new_states.stop))
+    if isinstance(selected, Momenta) and isinstance(known_table, Momenta):
+        # A mass that is not written is a lower bound from the states that were read.
+        masses = [selected.masses, known_table.masses]
+        known_masses = [values for values in masses if values is not None]
+        if known_masses:
+            return replace(selected, masses=np.fmax.reduce(known_masses))
+    return selected
+
+
+def _is_unsettled(table: Table) -> bool:
+    """Return True if the last two times of a table are as close as printed times can be."""
+    precision = (
+        table.precision if not isinstance(table, History) else table.time_precision
+    )
+    steps = np.diff(table.time[-2:])
+    return any(steps <= _APART * precision.quanta(table.time[-1:]))

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 # PROBE: the parts are rigid, and the engine run continues until it shows the contact that ends the flight.
 # RIGID: the parts are rigid, and the engine run ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
-RIGID_KINDS: Final = (PROBE, RIGID)
 # Largest difference of times that are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
@@ -97,7 +96,11 @@ class Order(NamedTuple):
     @property
     def rigid(self) -> bool:
         """Return True if the parts are rigid in this engine run."""
-        return self.kind in RIGID_KINDS
+        return self.kind != LOAD
+
+    def undone(self) -> Order:
+        """Return the order at the end of the engine run before this one, as if this one had not been computed."""
+        return self._replace(number=self.number - 1, until=self.start)
 
     def following(self, kind: str, until: float) -> Order:
         """Return the request for an engine run that begins at the end of this one."""
@@ -155,11 +158,6 @@ class Leg(NamedTuple):
     cpu: float | None = None
 
     @property
-    def kind(self) -> str:
-        """Kind of the engine run: load, probe or rigid."""
-        return self.order.kind
-
-    @property
     def length(self) -> float:
         """Duration of the engine run [time]."""
         return self.order.until - self.order.start
@@ -196,12 +194,10 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order = _return_before_contact(legs, limits)
     elif last.until >= limits.end:
         return None
-    elif last.kind == PROBE:
-        order = _order_probe(last, legs, limits)
-    elif last.kind == RIGID:
-        order = _follow_window(last, findings, limits)
+    elif last.kind == PROBE or _starts_window(last, findings, limits):
+        order = _order_probe(legs, limits)
     else:
-        order = _follow_load(legs, limits)
+        order = _order_load(last, findings, limits)
     if order.number > MOST_LEGS:
         raise D2RPickError(
             f"the run needs more than {MOST_LEGS} engine runs, which the solver cannot number; increase `wait`"
@@ -209,97 +205,94 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     return order
 
 
-def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Schedule a probe if a flight was detected and can still pay off, otherwise one more deformable engine run."""
-    last, findings = legs[-1].order, legs[-1].findings
-    switches = (
+def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
+    """Return True if a deformable engine run has shown a flight that may be switched and can still pay off."""
+    return (
         findings.flies
         and findings.free >= last.switch_after
         and limits.end - last.until > _WORTH * limits.end
         and last.number <= MOST_LEGS - _KEPT_BACK
     )
-    if not switches:
-        return _order_load(last, findings, limits)
-    if not findings.idle and findings.tr <= last.start:
-        # The energy was higher at the start of the engine run, so the probe begins there and replaces the engine run.
-        last = last._replace(number=last.number - 1, until=last.start)
-    return _order_probe(last, legs, limits)
-
-
-def _follow_window(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run after td. The flight in which the window ends is not switched again."""
-    return _order_load(last, findings, limits)._replace(switch_after=last.until)
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time."""
+    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time.
+
+    The flight in which a window ends is not switched again.
+    """
     now, end = last.until, limits.end
     legs_left = MOST_LEGS - _KEPT_BACK - last.number
     if legs_left <= 0:
         return last.following(LOAD, end)
-    in_flight = (
-        not last.rigid and findings.free >= last.switch_after and not findings.flies
-    )
-    flight_start = findings.free if in_flight else now
     wait = findings.wait or _UNKNOWN * end
+    flight_start = now
+    if last.rigid:
+        last = last._replace(switch_after=now)
+    elif findings.free >= last.switch_after and not findings.flies:
+        flight_start = findings.free
     until = max(flight_start + wait, now + _LEAST * wait, now + (end - now) / legs_left)
     return last.following(LOAD, limits.until_end(until))
 
 
-def _order_probe(last: Order, legs: Sequence[Leg], limits: Limits) -> Order:
-    """Schedule the next part of a probe, which begins at the end of ``last`` or has begun earlier."""
-    now = last.until
-    flown = now - _get_first_rigid_leg(legs).start if last.rigid else 0.0
+def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
+    """Schedule the next part of a probe, which begins after the last engine run or has begun earlier."""
+    last, findings = legs[-1].order, get_flight_findings(legs)
+    flown = 0.0
+    if last.rigid:
+        flown = last.until - collect_joined_legs(last, legs)[0].start
+    elif not findings.idle and findings.tr <= last.start:
+        # The energy was higher at the start of the engine run, so the probe begins there and replaces the engine run.
+        last = last.undone()
     length = max(
-        get_flight_findings(legs).wait or 0.0,
+        findings.wait or 0.0,
         _OF_FLOWN * flown,
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
     )
-    return last.following(PROBE, limits.until_end(now + length))
+    return last.following(PROBE, limits.until_end(last.until + length))
 
 
 def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     """Schedule the engine run that ends the window at its td, or a deformable one if the window does not pay off."""
-    window, first = find_next_window(legs, limits), _get_first_rigid_leg(legs)
+    window = find_next_window(legs, limits)
+    orders = collect_joined_legs(legs[-1].order, legs)
     findings = get_flight_findings(legs)
     if window.reason:
-        before = first._replace(number=first.number - 1, until=first.start)
-        load = _order_load(before, findings, limits)
-        return load._replace(switch_after=first.start + limits.same)
-    last = None
-    for order in collect_joined_legs(legs[-1].order, legs):
-        if order.until <= window.td:
-            last = order
-    if last is None:
-        return first._replace(kind=RIGID, until=window.td)
-    if last.until == window.td:
-        return _follow_window(last, findings, limits)
-    return last.following(RIGID, window.td)
+        load = _order_load(orders[0].undone(), findings, limits)
+        return load._replace(switch_after=window.tr + limits.same)
+    orders_before = [order for order in orders if order.until <= window.td]
+    if not orders_before:
+        return orders[0]._replace(kind=RIGID, until=window.td)
+    if orders_before[-1].until == window.td:
+        return _order_load(orders_before[-1], findings, limits)
+    return orders_before[-1].following(RIGID, window.td)
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     """Return the window before the contact that the last engine run showed, or else up to the end of the run."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
-    findings = get_flight_findings(legs)
-    free, wait = findings.free, findings.wait or 0.0
-    tr, end, contact = (
+    findings, contact = get_flight_findings(legs), legs[-1].findings.contact
+    window = Window(
+        findings.free,
         rigid_orders[0].start,
         rigid_orders[-1].until,
-        legs[-1].findings.contact,
+        contact,
+        findings.wait or 0.0,
     )
     if contact is None:
-        return Window(free, tr, end, None, wait)
-    td = contact - limits.margin_of(contact - free, idle=findings.idle)
+        return window
+    flight = contact - findings.free
+    td = contact - limits.margin_of(flight, idle=findings.idle)
     for order in rigid_orders:
         if 0 <= td - order.until <= limits.same:
             td = order.until  # An engine run must have at least two states.
-    reason = _explain_too_little_saved(legs, tr, td, limits)
-    if not findings.idle and contact - free < _SWINGS * findings.swing:
+    reason = _explain_too_little_saved(legs, window.tr, td, limits)
+    if not findings.idle and flight < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
-    is_out_of_place = reason is None and td - free < findings.steady_from
-    warning = findings.swing_warning if is_out_of_place else ""
-    return Window(free, tr, td, contact, wait, reason, warning)
+    warning = ""
+    if reason is None and td - findings.free < findings.steady_from:
+        warning = findings.swing_warning
+    return window._replace(td=td, reason=reason, warning=warning)
 
 
 def _explain_too_little_saved(
@@ -311,12 +304,12 @@ def _explain_too_little_saved(
     """
     if td <= tr:
         return "its margin begins before tr"
-    cost, cycles, length = 0.0, 0, 0.0  # The cost is counted in deformable cycles.
+    deformable_legs = [leg for leg in legs if not leg.order.rigid and leg.cycles]
+    length = sum(leg.length for leg in deformable_legs)
+    cycles = sum(leg.cycles or 0 for leg in deformable_legs)
+    cost = 0.0  # The cost is counted in deformable cycles.
     for leg in legs:
-        if not leg.order.rigid:
-            cycles += leg.cycles or 0
-            length += leg.length if leg.cycles else 0.0
-        elif leg.order.start >= tr:
+        if leg.order.rigid and leg.order.start >= tr:
             cost += (leg.cycles or 0) * limits.rigid_cycle + _RESTART
     saved = (td - tr - cost * length / max(cycles, 1)) / limits.end
     if saved >= _WORTH:
@@ -333,11 +326,6 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
     ):
         joined.insert(0, previous)
     return joined
-
-
-def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
-    """Return the engine run in which the parts became rigid, if they are still rigid in the last engine run."""
-    return collect_joined_legs(legs[-1].order, legs)[0]
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:

@@ -54,14 +54,23 @@ def find_swing(history: History, start: float, tr: float) -> Swing | None:
     moving_parts = tuple(momenta.parts[number] for number in momenta.moving)
     drift = find_drift_in_flight(history, Flight(start, tr, "momentum", moving_parts))
     if drift is None:
-        return _find_swing_of_two(momenta, start, tr)
-    error = float(np.max(drift.errors(drift.time, float(drift.time[-1]))))
-    path = float(drift.path[-1])
-    return _make_swing(drift.part.name, error, path, tr - start)
+        measured = _measure_pair(momenta, start, tr)
+    else:
+        error = float(np.max(drift.errors(drift.time, float(drift.time[-1]))))
+        measured = drift.part.name, error, float(drift.path[-1])
+    if measured is None or measured[2] <= 0:
+        return None
+    name, error, path = measured
+    return Swing(name, error, error / path / MOST_OF_PATH * (tr - start), drift is None)
 
 
-def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | None:
-    """Return an upper limit of the displacement from the momenta of two parts; None if other parts move too."""
+def _measure_pair(
+    momenta: Momenta, start: float, tr: float
+) -> tuple[str, float, float] | None:
+    """Return the lighter of two parts, an upper limit of the displacement, and the path; None if other parts move too.
+
+    The displacement of the heavier part and the path of both are in the unit of length.
+    """
     inside = find_window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
     if momenta.parts is None or masses is None or time.size < 2:
@@ -78,14 +87,4 @@ def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | Non
     displacements, path = integrate_displacements(time, velocity, masses[pair])
     of_heavy = displacements[:, heavy]
     error = float(np.linalg.norm(of_heavy - of_heavy[-1], axis=1).max())
-    name = momenta.parts[pair[light]].name
-    return _make_swing(name, error, float(path[-1]), tr - start, at_most=True)
-
-
-def _make_swing(
-    name: str, error: float, path: float, duration: float, *, at_most: bool = False
-) -> Swing | None:
-    """Return the oscillation of a part and the body's path in the flight so far; None if there is no path."""
-    if path <= 0:
-        return None
-    return Swing(name, error, error / path / MOST_OF_PATH * duration, at_most)
+    return momenta.parts[pair[light]].name, error, float(path[-1])

@@ -9,14 +9,12 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError, list_names
 from d2rpick.histories.listings import WITH_AN_ERROR, find_ending
 from d2rpick.histories.source import expand, find_later_legs
 from d2rpick.running.events import Event, find_events
-from d2rpick.running.evidence import GrowingEvidence
-from d2rpick.running.inner_motion import wait_of_deck
 from d2rpick.running.looks import Looks
 
 if TYPE_CHECKING:
@@ -24,7 +22,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
-    from d2rpick.running.events import Decided
+
+    # Number of a file, its size, and the time at which it was written [s].
+    FileStamp = tuple[int, int, float]
 
 # Largest fraction of the time of a processor core that reading may take [-].
 _SHARE: Final = 0.01
@@ -40,19 +40,11 @@ _NO_EVIDENCE: Final = (
 )
 
 
-class WatchedFile(NamedTuple):
-    """Identity of a watched file: its number, its size, and the time at which it was ``written`` [s]."""
-
-    number: int
-    size: int
-    written: float
-
-
 class Watch:
     """Watches a run that is being computed.
 
-    ``names`` are its files or its folder, which need not exist yet.  ``ended`` says how the listing reports the end of
-    the run, None before.
+    ``names`` are its files or its folder, which need not exist yet.  ``looks`` read the files.  ``ended`` says how the
+    listing reports the end of the run, None before.
     """
 
     def __init__(
@@ -63,21 +55,13 @@ class Watch:
         inventory: Inventory | None = None,
     ) -> None:
         self._names = names
-        self._of_looks = (selection, inventory)
-        self._waits = (wait, wait_of_deck(inventory) if inventory else None)
-        self._looks = Looks(*self._of_looks)
-        self._begin_again()
-        self._files: dict[str, WatchedFile] = {}
+        self.looks = Looks(selection, inventory, wait)
+        self._files: dict[str, FileStamp] = {}
         self._events: tuple[Event, ...] = ()  # Events that were reported so far.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
         self.ended: str | None = None
-
-    def _begin_again(self) -> None:
-        """Forget all states of the run, but not the reported events."""
-        self._evidence = GrowingEvidence(*self._waits)
-        self._decided: Decided = {}
 
     def news(self) -> Iterator[Event]:
         """Return the events since the last read; empty for a run that has not begun.
@@ -98,67 +82,51 @@ class Watch:
             except (FormatError, HistoryError) as error:
                 # The error is not raised, because the solver may be writing the file at this moment.
                 self._error = error
-                self._looks = Looks(*self._of_looks)
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
         now = time.time()
-        written = max((stamp.written for stamp in files.values()), default=now)
-        silence = now - written
+        silence = now - max((written for _, _, written in files.values()), default=now)
         if self._error and silence > _SILENT:
             raise self._error
         if silence > self._report_silence_after and not self.ended:
             self._report_silence_after = 2 * silence
             yield self._make_event("silent", f"nothing was written for {silence:.0f} s")
 
-    @property
-    def reads_what_is_new(self) -> bool:
-        """Return True if the next read covers only the new states."""
-        return self._looks.grow
-
     def state(self) -> Event:
         """Return a sentence that states whether the parts fly now, and since when."""
-        time, message = None, "no flight yet"
         if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
                 message = f"cannot be read yet: {self._error}"
             return self._make_event("state", message)
+        time, message = None, "no flight yet"
         for event in self._events:
             if event.event == "flight":
                 time, message = event.time, f"flies since {event.time:.6g}"
             elif event.event == "contact":
                 time, message = None, f"no flight since {event.time:.6g}"
-        if (
-            time is None
-            and self._evidence.motion.longest(self._last_time) is None
-            and self._waits[0] is None
-        ):
+        now, evidence = self._last_time, self.looks.evidence
+        wait = evidence.given or evidence.motion.longest(now)
+        if time is None and wait is None:
             message += (
                 "; the force-free time that marks a flight is unknown: give `wait`"
             )
-        return self._make_event("state", message)._replace(time=time)
+        return Event("state", time, now, message)
 
     def _read(self, names: Sequence[str]) -> Iterator[Event]:
         """Read the new states and return their events."""
-        if not names:
+        if not names or not self.looks.look(names):
             return
-        states, follows = self._looks.new_states(names)
-        if not states.time.size:
-            return
-        balance = states.balance
-        if not states.momenta and (balance is None or balance.sliding is None):
+        evidence = self.looks.evidence
+        if not evidence.witnesses:
             raise RangeError(f"{', '.join(names)}: {_NO_EVIDENCE}")
-        if not follows:
-            self._begin_again()
-        self._evidence.take(states)
-        time = self._evidence.history.time
-        now, before = float(time[-1]), self._last_time
-        events = find_events(self._evidence, self._decided)
+        now, before = evidence.history.end, self._last_time
+        events = find_events(evidence)
         pairs = zip(self._events, events, strict=False)
         kept_count = sum(event == event_before for event, event_before in pairs)
         if before is None:
             message = f"the run has reached {now:.6g}"
-            yield Event("begun", float(time[0]), now, message)
+            yield Event("begun", evidence.history.start, now, message)
         elif now < before or kept_count < len(self._events):
             message = (
                 f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
@@ -199,7 +167,7 @@ def follow(
         begun = time.process_time()
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
-        if watch.reads_what_is_new:
+        if watch.looks.resume_points:
             # Only the first read covers all states, so later pauses are short.
             pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()
@@ -209,7 +177,7 @@ def follow(
         rest(min(pause, remaining))
 
 
-def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
+def find_files(names: Sequence[str]) -> dict[str, FileStamp]:
     """Return the non-empty files of a run, including those of later engine runs in the folder, with stamps."""
     try:
         paths = expand(names)
@@ -223,7 +191,5 @@ def find_files(names: Sequence[str]) -> dict[str, WatchedFile]:
         with suppress(OSError):
             status = Path(path).stat()
             if status.st_size:
-                files[path] = WatchedFile(
-                    status.st_ino, status.st_size, status.st_mtime
-                )
+                files[path] = status.st_ino, status.st_size, status.st_mtime
     return files

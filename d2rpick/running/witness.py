@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-    # A function that returns the waiting time for a flight since ``start``, from the states up to ``now``, or None.
-    Needed = Callable[[float, float], Wait | None]
-
 # Largest change of a constant momentum or contact energy, as a fraction of its largest value so far [-].
 # CONSTANT is 10 times the error of sums in single precision.
 CONSTANT: Final = 1e-4
@@ -53,8 +50,8 @@ class Quiet(NamedTuple):
         First state at which a force acts [time]; None if the record ends before.
     wait : Wait
         Force-free time that showed the flight.
-    source : str
-        "momentum" or "contact-energy".
+    quantity : str
+        The quantity that shows the flight: "momentum less gravity" or "contact energy".
     left : float
         Change of the momentum or contact energy from ``start`` to ``seen``, as a share of the largest value so far [-].
     gravity : float
@@ -69,7 +66,7 @@ class Quiet(NamedTuple):
     seen: float
     end: float | None
     wait: Wait
-    source: str
+    quantity: str
     left: float
     gravity: float = 0.0
     parts: tuple[Part, ...] | None = None
@@ -89,6 +86,8 @@ class GrowingWitness:
 
     Attributes
     ----------
+    time : array of float
+        Times of the states, shape (n,) [time].
     members : tuple of int
         Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
     free : list of int
@@ -107,17 +106,13 @@ class GrowingWitness:
         self.flights: list[Quiet] = []
         self.pauses: list[tuple[float, float]] = []
         self._columns = GrowingColumn()
+        self.time: Samples = self._columns.rows
         self._laws: list[tuple[Law, Samples]] = []
         # True for each state at which the printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
         # Start of the force-free time that lasts at the last examined state [time].
         self._start = 0.0
         self._examined_count = self._test_again_at = 0
-
-    @property
-    def time(self) -> Samples:
-        """Times of the states, shape (n,) [time]."""
-        return self._columns.rows[:, 0]
 
     def add(
         self,
@@ -129,8 +124,8 @@ class GrowingWitness:
 
         ``columns`` (k, 5) are time, contact energy (NaN where it is not used), and momentum.
         """
-        self._columns.add(columns)
-        contact, momentum = self._columns.rows[:, 1], self._columns.rows[:, 2:]
+        self.time, contact, *_ = self._columns.add(columns).T
+        momentum = self._columns.rows[:, 2:]
         self._laws = []
         is_used = ~np.isnan(contact)
         if is_used.any():
@@ -166,12 +161,13 @@ class GrowingWitness:
 
     def examine(
         self,
-        needed: Needed,
+        find_wait: Callable[[float, float], Wait | None],
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
         """Update the lists of flights and of ended force-free times with the new states.
 
-        ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
+        ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None;
+        ``find_gravity`` the gravity between two states, None if another force acts or a support holds parts.
         """
         time = self.time
         for state in range(self._examined_count, len(self.free)):
@@ -191,7 +187,7 @@ class GrowingWitness:
                 and self._test_again_at <= state
                 and self._shows_forces[state]
             ):
-                wait = needed(start, now)
+                wait = find_wait(start, now)
                 if wait is not None and now - start >= wait.time:
                     self._see(first, state, wait, find_gravity(self, first, state))
             self._start = start
@@ -208,7 +204,7 @@ class GrowingWitness:
                 seen=float(self.time[state]),
                 end=None,
                 wait=wait,
-                source="momentum" if self.members else "contact-energy",
+                quantity="momentum less gravity" if self.members else "contact energy",
                 left=CONSTANT * self.misfit(first, state),
                 gravity=gravity,
                 parts=self.parts,

@@ -89,9 +89,8 @@ class LineScatter:
         lines = reading.spectrum.lines
         middle = (tr + td) / 2
         lost = _differentiate_waves(lines, tr) - 2 * _differentiate_waves(lines, middle)
-        lost = lost - _differentiate_coherence(lines, tr, td) * np.tile(
-            reading.is_mode, 4
-        )
+        raised = (1 + reading.hidden_pairs) * np.tile(reading.is_mode, 4)
+        lost = lost - _differentiate_coherence(lines, tr, td) * raised
         of_level = np.zeros_like(lost)
         of_mean = np.zeros((tr.size, reading.spectrum.mean.poles.size))
         level_of_mean = np.zeros_like(of_mean)
@@ -99,9 +98,9 @@ class LineScatter:
             of_mean += reading.spectrum.mean.waves(tr).real
             level_of_mean += 2 * reading.spectrum.mean.waves(td).real
         else:
-            is_mode = np.tile(reading.is_mode, 4)
-            lost = lost * is_mode + _differentiate_level(lines, tr) * is_mode / 2
-            of_level += _differentiate_level(lines, td) * is_mode
+            lost = lost * np.tile(reading.is_mode, 4)
+            lost += _differentiate_level(lines, tr) * raised / 2
+            of_level += _differentiate_level(lines, td) * raised
         gradient = np.hstack([lost, of_mean])
         level_gradient = np.hstack([of_level, level_of_mean])
         squared = reading.residual_squared(tr, td)

@@ -50,9 +50,10 @@ _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
 # Length of the first part of the record that is searched for early decaying lines, as a fraction of the record [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
+# _SURE_TURNS: number of cycles above which a line cannot be confused with slow changes of the mean.
 # _MOST_DAMPED: largest damping of a line, as a fraction of its angular frequency [-].
 # _MOST_DECAY: largest exponent with which a line decays within the record [-].
-_LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 40.0
+_LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
 # Largest exponent with which noise makes a vibration seem to grow over the record [-].
 _MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
@@ -213,6 +214,16 @@ class Spectrum(NamedTuple):
             -self.rest,
         )
 
+    def count_slow_as_mean(self, span: float) -> Spectrum:
+        """Return the spectrum with all lines in the mean that do not complete a cycle in the ``span`` [time]."""
+        is_slow = self.lines.poles.imag * span < 2 * np.pi * _SURE_TURNS
+        slow = self.lines.some(is_slow)
+        mean = self.mean._replace(
+            poles=np.concatenate([self.mean.poles, slow.poles]),
+            weights=np.concatenate([self.mean.weights, slow.weights]),
+        )
+        return self._replace(lines=self.lines.some(~is_slow), mean=mean)
+
     def at(self, t: Samples | float) -> Samples:
         """Return the energy at each time, with the shape of ``t`` [energy]."""
         return self.lines.at(t) + self.mean.at(t)
@@ -234,6 +245,13 @@ class Prediction(NamedTuple):
         """Convert a prediction of the kinetic energy to the corresponding prediction of the internal energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
+
+    def count_slow_as_mean(self, span: float) -> Prediction:
+        """Return the prediction with all lines in the mean that do not complete a cycle in the ``span`` [time]."""
+        return self._replace(
+            spectrum=self.spectrum.count_slow_as_mean(span),
+            of_first_part=self.of_first_part.count_slow_as_mean(span),
+        )
 
 
 def predict(grid: Grid) -> Prediction | None:

@@ -107,10 +107,10 @@ def _find_side_lines(
     size = np.abs(lines.weights)
     rate = lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
-    least = max(NOTABLE * float(size.max(initial=0.0)), ABOVE_SCATTER * scatter)
+    least_size = max(NOTABLE * float(size.max(initial=0.0)), ABOVE_SCATTER * scatter)
     middle_size = size * np.exp(lines.poles.real * span / 2)
     stretches = []
-    for first, second in combinations(np.flatnonzero(size > least).tolist(), 2):
+    for first, second in combinations(np.flatnonzero(size > least_size).tolist(), 2):
         if abs(np.log(middle_size[first] / middle_size[second])) > _SAME_HEIGHT:
             continue
         apart = np.abs(rate - rate[first] - rate[second]) * span
@@ -189,11 +189,16 @@ def measure_third_harmonic(
     course = np.exp(third_pole * (time - middle))
     in_rest = 2 * (course.conj() @ spectrum.rest) / np.sum(np.abs(course) ** 2)
     third = np.sum(heights[is_third]) + in_rest
+    height = float(abs(first))
+    # The third harmonic of a spring has three times the phase of the first one.
+    turned_back = third * (first.conj() / abs(first)) ** 3
+    # A line that decays is seen for a part of the window only.
+    widening = float(np.exp(max(-third_pole.real, 0.0) * span / 2))
     return ThirdHarmonic(
-        second / float(abs(first)),
-        _THIRD_OF_SPRING * second**2 / float(abs(first)),
-        float((third * (first.conj() / abs(first)) ** 3).real),
-        scatter * float(np.exp(max(-third_pole.real, 0.0) * span / 2)),
+        second / height,
+        _THIRD_OF_SPRING * second**2 / height,
+        float(turned_back.real),
+        scatter * widening,
     )
 
 

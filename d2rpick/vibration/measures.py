@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Largest increase of the frozen-deformation error within the timing tolerance [-].
 TOLERATED_GROWTH = 0.05
+# Half-width of the error band of R^2 due to noise, in standard deviations; 2.5 cover 98.8 % of normal errors.
+BAND_DEVIATIONS = 2.5
 # Ratio of the part of R^2 that depends on the phases at td to the damping ratio [-]; in theory, it is at most 2.
 _PHASES_COUNT = 1.5
 
@@ -240,16 +242,18 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     by the tolerated growth; one period if q stays inside, since q has then passed all its values.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
-    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(
-        mode.vibration_energy(td)
-    )
-    half = np.pi / mode.omega
+    amplitude = np.sqrt(mode.vibration_energy(td))
+    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * amplitude
+    half_period = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # Columns of the times of zero velocity on both sides of tr. Between these times, q is monotone.
-    steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
+    # Times of zero velocity on both sides of tr, in columns: first those after each tr, then those before.
+    steps_after, steps_before = [0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]
+    steps = np.repeat([steps_after, steps_before], tr.size, axis=0).T * half_period
+    # Between these times q is monotone.
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
-    return np.asarray(np.minimum(distances.reshape(2, -1).min(axis=0), 2 * half))
+    nearest = distances.reshape(2, -1).min(axis=0)
+    return np.asarray(np.minimum(nearest, 2 * half_period))
 
 
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
@@ -291,9 +295,8 @@ def vertices(
     # A sample next to an infinite value, or on a straight line, is its own vertex.
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
-    return time[at] + step, values[at] + np.multiply(
-        step, slope / 2, out=np.zeros(at.shape), where=bent
-    )
+    rise_to_vertex = np.multiply(step, slope / 2, out=np.zeros(at.shape), where=bent)
+    return time[at] + step, values[at] + rise_to_vertex
 
 
 class Profile(NamedTuple):
@@ -357,9 +360,9 @@ class Profile(NamedTuple):
     ) -> Samples:
         """Return the distance from each ``tr`` to where the error exceeds ``limit`` [time], by linear interpolation."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
-        (t0, e0), (t1, e1) = (
-            (self.time[at], self.error[at]) for at in (inside, outside)
-        )
+        t0, e0 = self.time[inside], self.error[inside]
+        t1, e1 = self.time[outside], self.error[outside]
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
         # If there is no sample between tr and the first sample outside, the sample outside is used.
-        return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))
+        leaving_time = np.where(e0 > limit, t1, t0 + share * (t1 - t0))
+        return np.asarray(np.abs(leaving_time - tr))

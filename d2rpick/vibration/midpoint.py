@@ -40,6 +40,9 @@ class Reading:
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
     record beside the spectrum that is kept, at ``times`` [energy], [time].
+
+    ``hidden_pairs`` is the energy of pairs of modes with equal frequencies and opposite phases, whose lines cancel each
+    other, over the energy that the lines show [-].
     """
 
     spectrum: Spectrum
@@ -48,6 +51,7 @@ class Reading:
     times: Samples
     rest: Samples
     tiny: float
+    hidden_pairs: float = 0.0
 
     @cached_property
     def modes(self) -> Exponentials:
@@ -57,7 +61,7 @@ class Reading:
     @cached_property
     def _peak_energies(self) -> Samples:
         """Return the peak energy of each mode at the time origin [energy]."""
-        return 2 * np.abs(self.modes.weights)
+        return 2 * (1 + self.hidden_pairs) * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
         """Return V, the elastic energy of the vibration [energy], in the shape of ``t``; noise may make it negative."""

@@ -8,7 +8,6 @@ band of its residuals.  If the record is not that of a linear structure in free 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -16,6 +15,13 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
+from d2rpick.vibration.doubts import (
+    MOST_BEYOND,
+    MOST_NEGATIVE,
+    StaticEnergy,
+    measure_doubts,
+)
+from d2rpick.vibration.hidden_energy import find_most_hidden, measure_hidden_pairs
 from d2rpick.vibration.line_scatter import LineScatter
 from d2rpick.vibration.lines import FIRST_PART, make_even_grid, predict
 from d2rpick.vibration.locked_lines import (
@@ -23,7 +29,6 @@ from d2rpick.vibration.locked_lines import (
     NOTABLE,
     StretchLine,
     find_stretches,
-    measure_harmonics,
     measure_third_harmonic,
 )
 from d2rpick.vibration.measures import Profile
@@ -34,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.doubts import Doubts
     from d2rpick.vibration.lines import (
         Complex,
         Exponentials,
@@ -53,30 +59,8 @@ _NO_STATIC: Final = 0.12
 _RESOLVED: Final = 2e-7
 # Smallest number by which energies are divided, as a fraction of the energy range of the record [-].
 _TINY: Final = 1e-12
-# Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
-_CHECKED: Final = 90
-
 # Smallest relative difference of mean energy and half peak energy at which no line is ambiguous [-].
 _AMBIGUOUS: Final = 0.08
-
-# Largest prediction error of an accepted record, relative to the range of the energy [-].
-_MOST_MISSED: Final = 0.5
-# Largest misfit of an accepted record, relative to the range of the energy [-].
-_MOST_MISFIT: Final = 0.3
-# _MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
-# _MOST_NEGATIVE_AT_ALL: limit that replaces _MOST_NEGATIVE if there is no better model [-].
-_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
-# Largest change of the static energy in an accepted record, relative to the mean vibration energy [-].
-_MOST_DRIFT: Final = 0.6
-# Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
-_MOST_BEYOND: Final = 0.12
-# Largest size of the harmonics in an accepted record, relative to their fundamental line [-].
-_MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest deficit of static energy for a static deformation, per mean vibration energy [-].
-# _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
-_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
-# Smallest number of states in an accepted record per period of the highest-frequency strong line.
-_FEWEST_PER_PERIOD: Final = 2.4
 
 # Number of times per period of the highest-frequency relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
@@ -86,7 +70,9 @@ _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
-_LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
+# _EXACT: largest error of exact modes, as a fraction of these two limits [-].
+# _SLOW_TOO: largest error at which slow modes are distinguished from other slow changes, as such a fraction [-].
+_LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
 # _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
@@ -96,8 +82,6 @@ _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
 _VAGUE_HALF: Final = 0.2
 # Number of times at which the error band is evaluated.
 _SOME_TIMES: Final = 64
-# Half-width of the error band of R^2 in standard deviations, as for a single oscillator.
-_DEVIATIONS: Final = 2.5
 # Effect on R^2 of the energy that the lines do not explain, as a factor on its fraction of the energy [-].
 # Noise in the energies at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 deviations bound 90 %.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
@@ -113,68 +97,6 @@ _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
-# Assumed number of lines that are hidden in the misfit.
-_HIDDEN_LINES: Final = 12
-
-
-class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means that there is no doubt [-].
-
-    ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
-    the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
-    one, relative to it; ``coarse`` is the number of states per period of the fastest strong line.
-    """
-
-    missed: float
-    misfit: float
-    negative: float
-    drift: float
-    beyond: float
-    harmonic: float
-    unstretched: float
-    coarse: float
-
-    @property
-    def refusal(self) -> str | None:
-        """Return the reason why the record is refused; None if it is accepted."""
-        return self._first_of(_MOST_NEGATIVE, _MOST_UNSTRETCHED)
-
-    @property
-    def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
-        return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
-
-    def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason why the record is refused under the given limits; None if there is no reason."""
-        reasons = (
-            (
-                self.coarse < _FEWEST_PER_PERIOD,
-                f"{self.coarse:.2g} states per period of the energy are too few",
-            ),
-            (
-                self.missed > _MOST_MISSED,
-                "the first part of the flight does not predict the rest",
-            ),
-            (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),
-            (self.negative > most_negative, "the lines hold more energy than there is"),
-            (
-                self.drift > _MOST_DRIFT,
-                "the mean energy changes in the flight by as much as vibrates",
-            ),
-            (
-                self.beyond > _MOST_BEYOND,
-                "the energy halfway is beyond what any deformations allow",
-            ),
-            (
-                self.harmonic > _MOST_HARMONIC,
-                "the lines are harmonics of one another, as those of a nonlinear spring",
-            ),
-            (
-                self.unstretched > most_unstretched,
-                "lines at half the rate of others hold more than the static energy",
-            ),
-        )
-        return next((reason for holds, reason in reasons if holds), None)
 
 
 class ModeAtTd(NamedTuple):
@@ -264,16 +186,14 @@ class ModalVibration:
 
     @property
     def is_exact(self) -> bool:
-        """Return True if the modes predict the record ten times better than required."""
-        return self._predicts_within(0.1)
+        """Return True if the modes predict the record much better than required."""
+        return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
         """Return True if the error of the modes, apart from white noise, is below ``share`` of the acceptable error."""
-        white = 1 - self.systematic
-        structure = self.doubts.misfit * np.sqrt(self.systematic)
-        missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
-        most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
-        return self.signed and structure < most_left and missed < most_missed**2
+        doubts = self.doubts
+        follows = _predicts_within(share, doubts.missed, doubts.misfit, self.systematic)
+        return self.signed and follows
 
     @property
     def told(self) -> str:
@@ -378,7 +298,7 @@ class ModalVibration:
             np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
             / level
         )
-        deviation = _DEVIATIONS * self.scatter.compute_deviation(tr, td)
+        deviation = measures.BAND_DEVIATIONS * self.scatter.compute_deviation(tr, td)
         # The accuracy of the lines follows from the fit and from a second fit to the first part of the record.
         of_lines = np.minimum(
             np.maximum(deviation, lines), np.maximum(squared, _MOST_OPPOSED)
@@ -439,6 +359,14 @@ class ModalVibration:
         """
         return self.half_width(tr, td) / 4
 
+    @property
+    def fallen(self) -> float:
+        """Return by how much the static energy falls in the window, relative to the mean vibration energy [-]."""
+        ends = self.time[[0, -1]]
+        level = self.reading.level_of_modes(ends)
+        static = self.reading.spectrum.mean.at(ends) - level / 2
+        return float((static[0] - static[1]) / max(np.mean(level) / 2, 1e-300))
+
     @cached_property
     def _phase_share(self) -> float:
         """Return the fraction of R^2 that depends on the phases of all modes at td [-]."""
@@ -467,19 +395,29 @@ class ModalVibration:
         """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
-        that the misfit can hide, and by the static energy itself.
+        that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
+        with slow decays, so what the first part of the record says of it is another interpretation.
         """
         none = np.zeros(squared.shape)
         shifts = [reading.residual_squared(tr, td) - squared for reading in self.others]
         if not (self.reading.no_static or self.is_ambiguous):
-            hidden = _find_most_hidden(self.reading.spectrum.rest)
+            hidden = find_most_hidden(self.reading.spectrum.rest)
             shifts.append(hidden / self.reading.level(td) * (1.5 - squared))
             nearest = np.argmin(np.abs(shifts), axis=0)
             shifts = [np.take_along_axis(np.array(shifts), nearest[np.newaxis], 0)[0]]
+        if self.has_slow_mode:
+            first = self.of_first_part.residual_squared(tr, td)
+            shifts.append(first - squared)
         return (
             np.max([none, *np.negative(shifts)], axis=0),
             np.max([none, *shifts], axis=0),
         )
+
+    @cached_property
+    def has_slow_mode(self) -> bool:
+        """Return True if the energy of a mode does not complete a cycle in the window."""
+        window = float(self.time[-1] - self.time[0])
+        return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
     @property
     def is_ambiguous(self) -> bool:
@@ -526,6 +464,11 @@ def identify_modal(
         np.abs(energy).max()
     ):
         return None
+    misfit = prediction.spectrum.error / prediction.swing
+    systematic = _correlate_neighbours(prediction.spectrum.rest)
+    if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
+        # What is no sum of lines, as under friction, changes slowly beside them.
+        prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
     window = float(time[0]), float(time[-1])
@@ -551,12 +494,28 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """Return True if the kinetic energy may be used because plastic flow or a damper makes the internal energy useless.
 
     The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
+    Plastic flow and dampers add to it.  If the static energy falls instead, a deformation relaxes, which moves the
+    parts although it does not vibrate.
     """
+    if internal.fallen > _NO_STATIC:
+        return False
     held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
     needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
-    return (
-        held > (1 - _MOST_NEGATIVE) * needed and internal.doubts.beyond < _MOST_BEYOND
-    )
+    return held > (1 - MOST_NEGATIVE) * needed and internal.doubts.beyond < MOST_BEYOND
+
+
+def _predicts_within(
+    share: float, missed: float, misfit: float, systematic: float
+) -> bool:
+    """Return True if the error of lines, apart from white noise, is below a ``share`` of the acceptable error.
+
+    ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
+    """
+    white = 1 - systematic
+    structure = misfit * np.sqrt(systematic)
+    systematically_missed = missed**2 - 2 * white * misfit**2
+    most_left, most_missed = share * _LITTLE_LEFT, share * _LITTLE_MISSED
+    return bool(structure < most_left and systematically_missed < most_missed**2)
 
 
 def _correlate_neighbours(remainder: Samples) -> float:
@@ -584,6 +543,14 @@ def _separate_stretches_from_springs(
     return stretches, [third for third in thirds.values() if third.may_be_of_spring]
 
 
+class _Interpretation(NamedTuple):
+    """The ``best`` reading of the lines, ``others`` that the record allows, and the ``static`` energy beside modes."""
+
+    best: Reading
+    others: tuple[Reading, ...]
+    static: StaticEnergy
+
+
 def _read(
     grid: Grid,
     prediction: Prediction,
@@ -596,97 +563,121 @@ def _read(
     ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
     """
     spectrum = prediction.spectrum
-    tiny = _TINY * prediction.swing
-    noise = spectrum.error
-    remainder = spectrum.rest
-    scatter = noise * np.sqrt(2 / grid.time.size)
-    systematic = _correlate_neighbours(remainder)
+    scatter = spectrum.error * np.sqrt(2 / grid.time.size)
+    systematic = _correlate_neighbours(spectrum.rest)
     stretches, springs = _separate_stretches_from_springs(spectrum, grid, scatter)
     may_be_spring = any(not third.is_of_spring for third in springs)
-    is_mode = _mask_modes(spectrum.lines, stretches)
-
     plain = Reading(
         spectrum,
-        np.ones(is_mode.shape, dtype=bool),
+        np.ones(spectrum.lines.poles.size, dtype=bool),
         True,
         grid.time,
-        systematic * remainder,
-        tiny,
+        systematic * spectrum.rest,
+        _TINY * prediction.swing,
     )
-    with_static = replace(plain, is_mode=is_mode, no_static=False)
-    half = with_static.level_of_modes(grid.time) / 2
-    static = spectrum.mean.at(grid.time) - half
+    interpretation = _choose_interpretation(
+        plain,
+        stretches,
+        may_be_spring=may_be_spring,
+        kinetic=kinetic,
+        systematic=systematic,
+    )
+    reading = interpretation.best
+    doubts = measure_doubts(
+        reading, interpretation.static, prediction, grid, stretches, scatter
+    )
+    # Heat or a drift that the first part predicts is no plastic flow, and leaves the lines as they are.
+    follows = _predicts_within(_EXACT, doubts.missed, doubts.misfit, systematic)
+    if follows and np.all(np.diff(interpretation.static.energy) > 0):
+        doubts = doubts._replace(drift=0.0)
+    if kinetic:
+        doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
+    return ModalVibration(
+        time=_close_times(reading, window, grid.time.size),
+        reading=reading,
+        others=interpretation.others,
+        of_first_part=_read_first_part(reading, prediction, grid, stretches, scatter),
+        doubts=doubts,
+        noise=spectrum.error,
+        systematic=systematic,
+        states_per_period=min(
+            grid.strong, _count_states(spectrum.lines, grid, scatter)
+        ),
+        scatter=LineScatter(reading, grid, systematic),
+        swinging=sum(stretch.energy for stretch in stretches if stretch.swings),
+        bent=max((third.second for third in springs), default=0.0),
+        source="kinetic energy" if kinetic else "internal energy",
+    )
+
+
+def _choose_interpretation(
+    plain: Reading,
+    stretches: tuple[StretchLine, ...],
+    *,
+    may_be_spring: bool,
+    kinetic: bool,
+    systematic: float,
+) -> _Interpretation:
+    """Choose whether lines of stretches are modes, and whether a part of the mean energy is static.
+
+    In the ``plain`` reading all lines are modes and all of the mean is vibration.  ``may_be_spring`` is True if a
+    second harmonic may be that of a stiffening spring, ``systematic`` the fraction of the misfit that neighbouring
+    states have in common.
+    """
+    spectrum = plain.spectrum
+    time = plain.times
+    with_static = replace(
+        plain, is_mode=_mask_modes(spectrum.lines, stretches), no_static=False
+    )
+    half = with_static.level_of_modes(time) / 2
+    static = spectrum.mean.at(time) - half
+    if not kinetic:
+        pairs = measure_hidden_pairs(static, 2 * half, spectrum.error, systematic)
+        plain = replace(plain, hidden_pairs=pairs)
+        with_static = replace(with_static, hidden_pairs=pairs)
+        static = static - pairs * half
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
-    half_of_all = plain.level_of_modes(grid.time) / 2
-    excess = abs(float(np.mean(spectrum.mean.at(grid.time) - half_of_all)))
-    ambiguous = (
-        bool(stretches)
-        and not kinetic
-        and excess < _AMBIGUOUS * float(np.mean(half_of_all))
-    )
-    hidden = _find_most_hidden(remainder)
+
+    # If the lines of stretches were modes and explained all of the mean, nothing would be static.
+    half_of_all = plain.level_of_modes(time) / 2
+    excess = abs(float(np.mean(spectrum.mean.at(time) - half_of_all)))
+    explains_mean = excess < _AMBIGUOUS * float(np.mean(half_of_all))
+    is_ambiguous = bool(stretches) and not kinetic and explains_mean
+
+    hidden = find_most_hidden(spectrum.rest)
     unresolved = share * mean < hidden / 2
     no_static = share < _NO_STATIC and unresolved and not stretches and not kinetic
-    if ambiguous and not all(stretch.is_exact for stretch in stretches):
+    if is_ambiguous and not all(stretch.is_exact for stretch in stretches):
         no_static = True
-    reading = plain if no_static else with_static
-    other_readings: tuple[Reading, ...] = ()
-    if ambiguous:
-        other_readings = (with_static if no_static else plain,)
-    elif may_be_spring and stretches:
-        other_readings = (replace(with_static, is_mode=plain.is_mode),)
-    elif not stretches and not kinetic:
-        other_readings = (with_static if no_static else plain,)
 
+    best, alternative = (plain, with_static) if no_static else (with_static, plain)
+    others: tuple[Reading, ...] = ()
+    if is_ambiguous or not (stretches or kinetic):
+        others = (alternative,)
+    elif may_be_spring and stretches:
+        others = (replace(with_static, is_mode=plain.is_mode),)
+    return _Interpretation(best, others, StaticEnergy(static, mean, share))
+
+
+def _read_first_part(
+    reading: Reading,
+    prediction: Prediction,
+    grid: Grid,
+    stretches: tuple[StretchLine, ...],
+    scatter: float,
+) -> Reading:
+    """Return the interpretation of the lines of the first part of the record, without the misfit."""
     first = prediction.of_first_part
+    first_stretches: tuple[StretchLine, ...] = ()
     if stretches:
         first_stretches = find_stretches(first.lines, FIRST_PART * grid.span, scatter)
-    else:
-        first_stretches = ()
-    of_first_part = replace(
+    return replace(
         reading,
         spectrum=first,
         is_mode=_mask_modes(first.lines, first_stretches),
         rest=np.zeros(grid.time.size),
     )
-    held = sum(stretch.energy for stretch in stretches) / mean
-    doubts = Doubts(
-        missed=prediction.missed,
-        misfit=noise / prediction.swing,
-        negative=max(-share - 2 * is_mode.size * scatter / mean, 0.0),
-        drift=float(np.std(static)) / mean,
-        beyond=_measure_beyond_bounds(reading, grid),
-        harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
-        unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)) * bool(stretches),
-        coarse=grid.strong,
-    )
-    if kinetic:
-        doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
-    return ModalVibration(
-        _close_times(reading, window, grid.time.size),
-        reading,
-        other_readings,
-        of_first_part,
-        doubts,
-        noise,
-        systematic,
-        min(grid.strong, _count_states(spectrum.lines, grid, scatter)),
-        LineScatter(reading, grid, systematic),
-        sum(stretch.energy for stretch in stretches if stretch.swings),
-        max((third.second for third in springs), default=0.0),
-        "kinetic energy" if kinetic else "internal energy",
-    )
-
-
-def _find_most_hidden(rest: Samples) -> float:
-    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
-
-    None of them is higher than the highest line of the rest, and together they are no more than the rest.
-    """
-    highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
-    most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
-    return float(2 * _HIDDEN_LINES * min(highest, most_together))
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
@@ -722,14 +713,3 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
     start, end = window
     periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
     return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
-
-
-def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """Return the excess of the overlap over its bounds, relative to the vibration energy (rms over pairs) [-]."""
-    even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
-    pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
-    tr, td = pairs.T
-    beyond = np.maximum(
-        np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0
-    )
-    return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))

@@ -10,7 +10,7 @@ from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import compute_median, get_ends
 from d2rpick.vibration.modal import ModalVibration, identify_modal
-from d2rpick.vibration.span import Span
+from d2rpick.vibration.span import ERRORS_OFF, MOST_REFITS, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,10 +24,8 @@ _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
 # Outside its window, a record follows the modes if its mean energies over part of the shortest period deviate little.
 # _MEANS_PER_PERIOD: number of mean energies that are checked in each period of the highest-frequency mode.
 # _MOST_OFF: largest deviation of the mean energy from the modes' prediction, relative to the vibration energy [-].
-# _SCATTERS_OFF: largest deviation of the mean energy from that predicted by the modes, in standard errors [-].
-_MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
-# Largest number of times that a window is extended and its modes are identified again.
-_MOST_REFITS: Final = 3
+# The mean energy may also deviate by ERRORS_OFF standard errors from that predicted by the modes.
+_MEANS_PER_PERIOD, _MOST_OFF = 8, 0.02
 
 
 class ModalWindow(NamedTuple):
@@ -51,11 +49,13 @@ def find_described(
         Where the energy seems to keep its level [time].
     """
     windows = _list_windows(history, td, guess)
-    for window in windows:
-        described = _grow_described(history, window)
-        if described is not None:
-            return described
-    return None
+    grown = (_grow_described(history, window) for window in windows)
+    first = next((described for described in grown if described is not None), None)
+    if first is None or first.vibration.is_exact:
+        return first
+    # The end of a load at its beginning may convince, but the next window is exact then.
+    second = next(grown, None)
+    return second if second is not None and second.vibration.is_exact else first
 
 
 @remember
@@ -113,7 +113,7 @@ def _identify_states(
 
 def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
     """Extend a window as far as the record follows its modes and identify these again, until it no longer changes."""
-    for _ in range(_MOST_REFITS):
+    for _ in range(MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
             break
@@ -161,7 +161,7 @@ def _count_up_to_last_off(
         means = np.abs(np.convolve(deviation, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(
             _MOST_OFF * vibration.vibration_energy(time[width - 1 :]),
-            _SCATTERS_OFF * vibration.noise / np.sqrt(width),
+            ERRORS_OFF * vibration.noise / np.sqrt(width),
         )
         is_off = np.flatnonzero(~(means <= room))
     return int(is_off[-1]) + width if is_off.size else 0

@@ -141,10 +141,11 @@ class Mode(SignedAmplitudes):
     def standstill_after(self, t: Samples | float) -> Samples:
         """Return the first time at or after ``t`` with q' = 0 [time]; the next one is half a period later."""
         cosine, sine = self._velocity_parts
-        # The velocity, cosine cos x + sine sin x, is 0 at x = phase + n pi.
+        # The velocity, cosine cos x + sine sin x with x = omega (t - origin), is 0 at x = phase + n pi.
         phase = np.arctan2(-cosine, sine)
-        turns = np.ceil((self.omega * (np.asarray(t) - self.origin) - phase) / np.pi)
-        return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
+        angle = self.omega * (np.asarray(t) - self.origin)
+        half_turns = np.ceil((angle - phase) / np.pi)
+        return np.asarray(self.origin + (phase + np.pi * half_turns) / self.omega)
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end) with q' = 0, in ascending order [time]."""

@@ -91,8 +91,9 @@ class SampledEnergy:
     def turns_near(self, tolerance: float, since: float) -> Samples:
         """Return the times (k,) from ``since`` to td at which the energy has an extremum near the level at td."""
         time, energy = self._sampled_before(since)
-        turns = find_turns(energy)[0]
-        near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
+        turns, _ = find_turns(energy)
+        level_errors = measures.level_error(energy[turns], energy[-1])
+        near = time[turns[level_errors <= tolerance]]
         return near[near >= since]
 
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
@@ -170,18 +171,20 @@ class OscillatorEnergy(SampledEnergy):
         times = np.maximum(
             self.mode.level_crossings(self.td, self.before), self.span.start
         )
-        (sampled, up), rising = (
-            self.crossings_before(since),
-            self.mode.energy_slopes(times)[0] > 0,
+        slopes, _ = self.mode.energy_slopes(times)
+        sampled_times, sampled_rising = self.crossings_before(since)
+        return (
+            np.append(sampled_times, times),
+            np.append(sampled_rising, slopes > 0),
         )
-        return np.append(sampled, times), np.append(up, rising)
 
     def crossings_before(self, since: float) -> Passages:
         """Return the crossings of the samples before the span."""
         if self.span.start <= max(since, self.history.time[0]):
             return np.zeros(0), np.zeros(0, dtype=bool)
-        sampled, up = super().crossings(since)
-        return sampled[sampled < self.span.start], up[sampled < self.span.start]
+        times, rising = super().crossings(since)
+        is_before = times < self.span.start
+        return times[is_before], rising[is_before]
 
     def standstills(self) -> Samples:
         """Return the times in the span up to td at which the energy has an extremum [time]."""
@@ -422,12 +425,13 @@ def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     distance = at - history.time[cell]
     share = distance / interval
     slope = (history.energy[cell + 1] - history.energy[cell]) / interval
-    energies = _compute_half_quanta(
-        history.energy_precision, history.energy[cell] + slope * distance
-    )
-    times = slope * _compute_half_quanta(history.time_precision, at)
-    square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
-    return energies + np.abs(times), square
+    interpolated = history.energy[cell] + slope * distance
+    of_energy = _compute_half_quanta(history.energy_precision, interpolated)
+    of_time = slope * _compute_half_quanta(history.time_precision, at)
+    # The variance of a uniform distribution is a third of its squared half-width; interpolation averages two of them.
+    weights = (1 - share) ** 2 + share**2
+    square = (of_energy**2 + of_time**2) / 3 * weights
+    return of_energy + np.abs(of_time), square
 
 
 def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
@@ -445,10 +449,12 @@ def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> S
         return np.zeros(at.shape)
     cell = np.searchsorted(time, at, side="right") - 1
     first = np.clip(cell[..., np.newaxis] + np.arange(-2, 2), 0, time.size - 3)
-    t0, t1, t2 = (time[first + i] for i in range(3))
-    e0, e1, e2 = (energy[first + i] for i in range(3))
-    second = np.abs(2 * ((e2 - e1) / (t2 - t1) - (e1 - e0) / (t1 - t0)) / (t2 - t0))
-    return np.asarray(second.max(axis=-1))
+    t0, t1, t2 = time[first], time[first + 1], time[first + 2]
+    e0, e1, e2 = energy[first], energy[first + 1], energy[first + 2]
+    slope_before = (e1 - e0) / (t1 - t0)
+    slope_after = (e2 - e1) / (t2 - t1)
+    curvature = np.abs(2 * (slope_after - slope_before) / (t2 - t0))
+    return np.asarray(curvature.max(axis=-1))
 
 
 def compute_reach(

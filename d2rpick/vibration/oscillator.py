@@ -90,8 +90,13 @@ class Oscillator:
         >>> Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50).omega_2
         249.864613022...
         """
-        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        square = self._squared_damped_rate
         return float(np.sqrt(square)) if square >= 0 else float("nan")
+
+    @property
+    def _squared_damped_rate(self) -> float:
+        """omega_2**2 [1/time^2], negative if overdamped; a difference of squares would lose digits or overflow."""
+        return (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
         """Return the state after ``elapsed`` of free motion from ``start``, equations (7) and (18) of the paper.
@@ -229,16 +234,18 @@ class Oscillator:
         If overdamped, it is the sum of two decaying exponentials.  The slower rate alpha/2 - kappa is computed
         from the product of the rates, omega_0^2, because the difference would lose all digits.
         """
-        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        square = self._squared_damped_rate
         if square >= 0:
             omega = np.sqrt(square)
             decay = np.exp(-self.alpha / 2 * t)
             return decay * np.cos(omega * t), decay * t * np.sinc(omega * t / np.pi)
         kappa = np.sqrt(-square)
-        slow = np.exp(-(self.omega_0**2) / (self.alpha / 2 + kappa) * t)
-        return slow * (1 + np.exp(-2 * kappa * t)) / 2, slow * -np.expm1(
-            -2 * kappa * t
-        ) / (2 * kappa)
+        slow_rate = self.omega_0**2 / (self.alpha / 2 + kappa)
+        slow = np.exp(-slow_rate * t)
+        # The faster exponential relative to the slower one, and 1 minus this ratio.
+        ratio = np.exp(-2 * kappa * t)
+        difference = -np.expm1(-2 * kappa * t)
+        return slow * (1 + ratio) / 2, slow * difference / (2 * kappa)
 
 
 def _compute_path(alpha: float, t: Values) -> Values:

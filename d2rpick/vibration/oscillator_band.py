@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Half-width of the error band of R^2 due to noise, in standard deviations.
-_DEVIATIONS: Final = 2.5
 # Largest effect on R^2 of a hidden mode that raises only the upper bound of the residual, not its value [-].
 _HARMLESS: Final = 0.25**2
 # Effect on R^2 of a hidden fraction of harmonics of a nonlinear spring, as a factor on this fraction [-].
@@ -45,7 +43,7 @@ def residual_band(
     assert fit.mode is not None
     mode = fit.mode
     squared = np.square(stated)
-    scatter = _DEVIATIONS * _compute_deviation(fit, tr, td)
+    scatter = measures.BAND_DEVIATIONS * _compute_deviation(fit, tr, td)
     share = measures.phase_share(mode.alpha, mode.omega)
     bent = _HARMONIC_COUNTS * fit.hidden_share * stated
     off = scatter + share * squared + bent

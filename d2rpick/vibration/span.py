@@ -45,16 +45,16 @@ _LEAST_PERIODS, _MOST = 1.25, 0.8
 _MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
 # _SHARE_OFF: limit of the mean error as a fraction of the vibration energy [-].
-# _ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
+# ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
 # _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
 # _MEANS_PER_PERIOD: number of mean errors per period.
-_SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
+_SHARE_OFF, ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 # Number of means per energy period that are used to detect a mode in only a part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
 # Smallest fraction of the bounds described by an oscillator that is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
-_MOST_REFITS = 8
+MOST_REFITS = 8
 
 # Largest ignored energy of a hidden mode, as a fraction of the vibration energy [-]; it is the error of solvers.
 SMALLEST: Final = 1e-3
@@ -75,6 +75,33 @@ class Span(NamedTuple):
     end: float
 
 
+class SpanSearch(NamedTuple):
+    """Where and how an oscillator is searched in a record.
+
+    Parameters
+    ----------
+    history : History
+    bounds : Span
+        The part of the record to search [time].
+    oscillator : Mode, optional
+        Compared with the samples, instead of an oscillator that is fitted to them.
+    whole : bool
+        Try only the bounds and their part up to td, because it is known that no load acts there.
+    quick : bool
+        Do not compute the misfit of a refused fit.
+    """
+
+    history: History
+    bounds: Span
+    oscillator: Mode | None = None
+    whole: bool = False
+    quick: bool = False
+
+    def fit(self, window: Span) -> Identification:
+        """Return the oscillator fitted to the states in a window, or the given one compared with them."""
+        return fit_window(self.history, window, self.oscillator, quick=self.quick)
+
+
 def limit_bounds(
     bounds: Span, td: float, after: float | None, landing: float | None
 ) -> Span:
@@ -90,28 +117,17 @@ def limit_bounds(
 
 
 def find_oscillator(
-    history: History,
-    td: float,
-    bounds: Span,
-    *,
-    oscillator: Mode | None = None,
-    fit_window: tuple[float, float] | None = None,
-    whole: bool = False,
-    quick: bool = False,
+    search: SpanSearch, td: float, window: tuple[float, float] | None = None
 ) -> tuple[Span | None, Identification]:
     """Return the window around ``td`` that a given or identified oscillator describes, and its fit.
 
     Parameters
     ----------
-    history : History
+    search : SpanSearch
     td : float
         [time]
-    bounds : Span
-        The part of the record to search [time].
-    oscillator, fit_window : optional
-        Given by the user: the oscillator itself, or the window to which it is fitted [time].
-    whole, quick : bool
-        As in `find_described_span`.
+    window : tuple of two times, optional
+        The window to which the oscillator is fitted, if the user gives it [time].
 
     Returns
     -------
@@ -120,17 +136,18 @@ def find_oscillator(
     fit : Identification
         The accepted fit, with the fraction of a hidden mode, or the reason why none is accepted.
     """
-    if fit_window:
-        fit = identify(*history.between(*fit_window))
+    history, bounds = search.history, search.bounds
+    if window:
+        fit = identify(*history.between(*window))
         span = find_span(history, td, fit, bounds) if fit.describes_record else None
         return span, _add_what_is_hidden(history, fit, span)
-    if oscillator:
-        return find_described_span(history, td, bounds, oscillator, whole=whole)
-    longest_fit = find_longest_described(history, bounds, whole)
+    if search.oscillator:
+        return find_described_span(search._replace(quick=False), td)
+    longest_fit = find_longest_described(history, bounds, search.whole)
     if longest_fit is not None and longest_fit[0].start <= td <= longest_fit[0].end:
         span, fit = longest_fit
     else:
-        span, fit = find_described_span(history, td, bounds, whole=whole, quick=quick)
+        span, fit = find_described_span(search, td)
     return span, _add_what_is_hidden(history, fit, span)
 
 
@@ -160,32 +177,12 @@ def _estimate_what_is_hidden(
 
 
 def find_described_span(
-    history: History,
-    td: float,
-    bounds: Span,
-    oscillator: Mode | None = None,
-    *,
-    whole: bool = False,
-    quick: bool = False,
+    search: SpanSearch, td: float
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last such window before td.
 
     First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
     grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
-
-    Parameters
-    ----------
-    history : History
-    td : float
-        [time]
-    bounds : Span
-        The part of the record to search [time].
-    oscillator : Mode, optional
-        Compared with the samples, instead of an oscillator that is fitted to them.
-    whole : bool
-        Try only the bounds and their part up to td, because it is known that no load acts there.
-    quick : bool
-        Do not compute the misfit of a refused fit.
 
     Returns
     -------
@@ -194,13 +191,12 @@ def find_described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    mark_of_td = _mark(bounds, td)
-    up_to_td = Span(bounds.start, mark_of_td)
-    windows = _list_windows_around(bounds, td, whole=whole)
+    up_to_td = Span(search.bounds.start, _mark(search.bounds, td))
     refused = {}
-    for window in windows:
-        quickly = quick or window != up_to_td
-        span, fit = _grow_span(history, td, window, bounds, oscillator, quick=quickly)
+    for window in _list_windows_around(search.bounds, td, whole=search.whole):
+        # Only the misfit of the window up to td is shown.
+        quickly = search.quick or window != up_to_td
+        span, fit = _grow_span(search._replace(quick=quickly), td, window)
         if span:
             return span, fit
         refused[window] = fit
@@ -214,7 +210,7 @@ def find_longest_described(
     """Find a window with most of the ``bounds`` that one oscillator describes; None if there is none.
 
     The window is the same for every td in it.  The search starts in the middle of the bounds, which the window
-    contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `find_described_span`.
+    contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `SpanSearch`.
     """
     start, end = bounds
     middle = (start + end) / 2
@@ -224,8 +220,9 @@ def find_longest_described(
         beginnings.append(_mark(bounds, middle - _BEGINNINGS[0] * (middle - start)))
         ends.append(_mark(bounds, middle + _ENDS[0] * (end - middle), 1))
     windows = [Span(*window) for window in product(beginnings, ends)]
+    search = SpanSearch(history, bounds, whole=whole, quick=True)
     for window in sorted(windows, key=lambda one: one.start - one.end):
-        span, fit = _grow_span(history, middle, window, bounds, None, quick=True)
+        span, fit = _grow_span(search, middle, window)
         if span and span.end - span.start >= _MOST_OF_BOUNDS * (end - start):
             return span, fit
     return None
@@ -292,11 +289,12 @@ def _find_span_of_mode(
     """Find the window around ``anchor`` in which the record follows a mode with this misfit."""
     time, energy = history.between(*bounds)
     period = 2 * np.pi / mode.omega
-    typical = float(
-        np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2]
-    )
-    width = max(3, round(period / _MEANS_PER_PERIOD / typical))
-    room = max(_ERRORS_OFF * rms / np.sqrt(width), _STRUCTURES_OFF * structure)
+    steps = np.diff(time)
+    middle_rank = steps.size // 2
+    typical_step = float(np.partition(steps, middle_rank)[middle_rank])
+    # Number of samples in a mean.
+    width = max(3, round(period / _MEANS_PER_PERIOD / typical_step))
+    room = max(ERRORS_OFF * rms / np.sqrt(width), _STRUCTURES_OFF * structure)
     middle = int(np.searchsorted(time, anchor))
     states_behind = width // 2
     ahead = (width - 1) // 2
@@ -322,9 +320,8 @@ def _find_span_of_mode(
     )
 
 
-@np.errstate(
-    over="ignore", invalid="ignore"
-)  # Far from the window, a damped fit overflows.
+# Far from the window, a damped fit overflows.
+@np.errstate(over="ignore", invalid="ignore")
 def _find_first_off(
     time: Samples,
     energy: Samples,
@@ -341,13 +338,12 @@ def _find_first_off(
     for begin in range(first, time.size, BLOCK):
         inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
         deviation = energy[inside] - mode.energy(time[inside])
-        means = np.abs(
-            _average_running(deviation, begin - inside.start, behind, ahead)[:BLOCK]
-        )
+        running = _average_running(deviation, begin - inside.start, behind, ahead)
+        means = np.abs(running[:BLOCK])
+        # A mean that is not a number exceeds every limit.
         loud = np.flatnonzero(~(means <= room))
-        far = loud[
-            ~(means[loud] <= _SHARE_OFF * mode.vibration_energy(time[begin + loud]))
-        ]
+        limit = _SHARE_OFF * mode.vibration_energy(time[begin + loud])
+        far = loud[~(means[loud] <= limit)]
         if far.size:
             return begin + int(far[0])
     return None
@@ -408,18 +404,13 @@ def _mark(bounds: Span, time: float, after: int = 0) -> float:
 
 
 def _grow_span(
-    history: History,
-    td: float,
-    window: Span,
-    bounds: Span,
-    oscillator: Mode | None,
-    *,
-    quick: bool,
+    search: SpanSearch, td: float, window: Span
 ) -> tuple[Span | None, Identification]:
     """Fit the window and extend it while the record follows the fit; repeat until the window no longer changes."""
-    fit = fit_window(history, window, oscillator, quick=quick)
+    bounds = search.bounds
+    fit = search.fit(window)
     span = window
-    for _ in range(_MOST_REFITS):
+    for _ in range(MOST_REFITS):
         if not fit.follows or fit.mode is None:
             return None, fit
         shortest = max(
@@ -429,7 +420,7 @@ def _grow_span(
         # If the period is much longer than the record, means would need more samples than exist.
         possible = shortest <= bounds.end - bounds.start
         anchor = min(td, window.end)
-        grown = _find_reach(history, bounds, anchor, fit) if possible else None
+        grown = _find_reach(search.history, bounds, anchor, fit) if possible else None
         if grown is None or grown.end - grown.start < shortest:
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
@@ -437,20 +428,14 @@ def _grow_span(
             # The fit fails, for example, if the window is too short.
             if not fit.describes_record:
                 return None, fit
-            return _clear_ends(history, grown, fit, bounds, oscillator, quick=quick)
+            return _clear_ends(search, grown, fit)
         span = grown
-        fit = fit_window(history, span, oscillator, quick=quick)
+        fit = search.fit(span)
     return (span, fit) if fit.describes_record else (None, fit)
 
 
 def _clear_ends(
-    history: History,
-    span: Span,
-    fit: Identification,
-    bounds: Span,
-    oscillator: Mode | None,
-    *,
-    quick: bool,
+    search: SpanSearch, span: Span, fit: Identification
 ) -> tuple[Span, Identification]:
     """Cut off half a period at each end where the record leaves the fit, and fit the rest again.
 
@@ -458,6 +443,7 @@ def _clear_ends(
     samples much better, it determines the window.
     """
     assert fit.mode is not None
+    bounds = search.bounds
     inset = np.pi / fit.mode.omega
     inner = Span(
         span.start + inset if span.start > bounds.start else span.start,
@@ -465,11 +451,11 @@ def _clear_ends(
     )
     if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
         return span, fit
-    core = fit_window(history, inner, oscillator, quick=quick)
+    core = search.fit(inner)
     if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
         return span, fit
     middle = (inner.start + inner.end) / 2
-    return _find_reach(history, bounds, middle, core) or span, core
+    return _find_reach(search.history, bounds, middle, core) or span, core
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
@@ -488,15 +474,13 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
     s = (time - time[0]) / span
-    remainder = average_cells(
-        s, integrate_by_trapezia(s, energy - mode.energy(time)), count
-    )
+    misfit = energy - mode.energy(time)
+    remainder = average_cells(s, integrate_by_trapezia(s, misfit), count)
     decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
     # The range is from one period in the record to the highest frequency that the cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
-    strongest = float(
-        np.abs(np.fft.rfft(remainder * decay, _FINER * count))[visible].max()
-    )
+    lines = np.abs(np.fft.rfft(remainder * decay, _FINER * count))
+    strongest = float(lines[visible].max())
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # The energy of a mode oscillates about its mean by half of the vibration energy.
     return min(2 * amplitude / float(mode.vibration_energy(time[0])), 1.0)
@@ -534,7 +518,7 @@ def measure_deviations(
         fit.rms + fit.structure
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        beyond_noise = np.abs(sums) / states - _ERRORS_OFF * noise / np.sqrt(states)
+        beyond_noise = np.abs(sums) / states - ERRORS_OFF * noise / np.sqrt(states)
     # A cell without states has no value.
     deviations = np.nan_to_num(np.maximum(beyond_noise, 0.0), posinf=0.0)
     padded = np.pad(deviations, _MEANS_PER_ENERGY_PERIOD)

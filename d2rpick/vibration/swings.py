@@ -121,10 +121,10 @@ class Swings(SignedAmplitudes):
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(hidden_share) + _UNRESOLVED, wrong_sign(0.0)
         )
-        least = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
+        lowest_squared = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
         highest = np.hypot(_OF_ANY_SPRING * stated, hidden)
         likely = np.sqrt(np.square(stated) + np.minimum(hidden_share, 1.0) / 2)
-        return likely, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
+        return likely, np.sqrt(np.maximum(lowest_squared, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the fraction of vibration energy at td of a mode hidden in the lower envelope, for each tr (n,) [-].
@@ -252,35 +252,32 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
             swing = abs(extreme - last_extreme) or swing
             last_extreme = extreme
             extreme, at, direction = value, turning_point, -direction
-    return np.array(
-        [turn for turn in turns if turn > 0], dtype=np.intp
-    ), last if direction > 0 else min(at, last)
+    inner_turns = np.array([turn for turn in turns if turn > 0], dtype=np.intp)
+    last_visible = last if direction > 0 else min(at, last)
+    return inner_turns, last_visible
 
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
     """Return values on straight lines through points, extrapolated from the first two and the last two points."""
-    first, last = (
-        y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
-        for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))
-    )
-    return np.asarray(
-        np.interp(time, np.array([time[0], *x, time[-1]]), np.array([first, *y, last]))
-    )
+    first_slope = (y[1] - y[0]) / (x[1] - x[0])
+    last_slope = (y[-2] - y[-1]) / (x[-2] - x[-1])
+    first = y[0] + first_slope * (time[0] - x[0])
+    last = y[-1] + last_slope * (time[-1] - x[-1])
+    times = np.array([time[0], *x, time[-1]])
+    values = np.array([first, *y, last])
+    return np.asarray(np.interp(time, times, values))
 
 
 def _measure_off_line(x: Samples, y: Samples) -> Samples:
     """Return the distance of each of n >= 3 values from the line through its two nearest neighbours."""
-    middle = np.clip(np.arange(x.size), 1, x.size - 2)
-    ends = np.arange(x.size) != middle
-    left_state = np.where(ends, middle, middle - 1)
-    right_state = np.where(ends, 2 * middle - np.arange(x.size), middle + 1)
-    return np.asarray(
-        y
-        - y[left_state]
-        - (y[right_state] - y[left_state])
-        / (x[right_state] - x[left_state])
-        * (x - x[left_state])
-    )
+    index = np.arange(x.size)
+    # The first and the last value have both neighbours on one side.
+    middle = np.clip(index, 1, x.size - 2)
+    is_end = index != middle
+    near = np.where(is_end, middle, middle - 1)
+    far = np.where(is_end, 2 * middle - index, middle + 1)
+    slope = (y[far] - y[near]) / (x[far] - x[near])
+    return np.asarray(y - y[near] - slope * (x - x[near]))
 
 
 class Envelope(NamedTuple):
@@ -329,23 +326,24 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     at, is_peak = find_turns(energy)
     floor = max(SOLVER_FLOOR * float(np.max(energy)), 0.0)
     high = at[is_peak & (energy[at] > floor)]
-    peaks = list(zip(time[high].tolist(), np.log(energy[high]).tolist(), strict=True))
-    if not peaks:
+    if not high.size:
         return None
-    middle = float(np.mean([t for t, _ in peaks]))
+    middle = float(np.mean(time[high]))
+    peaks = list(zip(time[high].tolist(), np.log(energy[high]).tolist(), strict=True))
     hull: list[tuple[float, float]] = []
     for peak in peaks:
         while len(hull) > 1 and _is_left_turn(hull[-2], hull[-1], peak):
             hull.pop()
         hull.append(peak)
-    next_vertex = next(
-        (i for i, (t, _) in enumerate(hull) if t > middle), len(hull) - 1
-    )
-    (t0, top0), (t1, top1) = hull[max(next_vertex - 1, 0)], hull[next_vertex]
+    vertices_after = [i for i, (t, _) in enumerate(hull) if t > middle]
+    right_vertex = vertices_after[0] if vertices_after else len(hull) - 1
+    t0, top0 = hull[max(right_vertex - 1, 0)]
+    t1, top1 = hull[right_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
     # The vibration energy never rises, so the highest peak bounds it.
     if rate <= 0:
-        return Envelope(float(np.exp(max(top for _, top in hull))), 0.0, middle, floor)
+        highest = max(top for _, top in hull)
+        return Envelope(float(np.exp(highest)), 0.0, middle, floor)
     return Envelope(float(np.exp(top0)), rate, t0, floor)
 
 

@@ -1,78 +1,94 @@
 """Find the constants that decide an answer: ``python -m tests.benchmarks.deciding_numbers TABLE``.
 
-Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled in a separate process.  The questions
-of `deciding_questions` that run through code with this constant are asked again, one of each kind first.  The table
-docs/developing/deciding-numbers.csv shows how many answers changed; constants that have changed no answer so far, or
-have another value, are tried again.  A constant that changes no answer is a guard against round-off, overflow or
-damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not needed.
+Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled, and questions of `deciding_questions`
+that run a line with this constant are asked again, until a few answers have changed or the time for a trial is over.
+One question of each kind is asked before the next one of any kind.  Every trial is a fork of a process that has
+imported everything and asked nothing.
+
+The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each.  Its rows
+of deciding constants are kept; constants that have changed no answer so far, or have another value, are tried again,
+with other questions if ``--seed`` is another one.  A constant that changes no answer is a guard against round-off,
+overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not
+needed.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import csv
-import importlib
+import gc
 import multiprocessing
-import pkgutil
+import re
+import signal
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FrameType, FunctionType, ModuleType
+from types import CodeType, FrameType
 from typing import Any, Final, NamedTuple
 
-import d2rpick
 from d2rpick.base.errors import D2RPickError
-from tests.benchmarks.deciding_questions import Question, make_questions
+from tests.benchmarks.deciding_constants import (
+    Constant,
+    Line,
+    Source,
+    Uses,
+    find_constants,
+    find_uses,
+    read_sources,
+    scale_constant,
+)
+from tests.benchmarks.deciding_questions import Answer, Question, make_questions
 
-PACKAGES: Final = ("vibration", "flight", "choice")
-FACTORS: Final = (0.5, 2.0)
+FACTORS: Final = {"halved": 0.5, "doubled": 2.0}
 # This number of changed answers shows that a constant decides; no further questions are asked.
 ENOUGH: Final = 3
+# A question takes at most this many times its usual duration, plus seconds; a scaled number of steps may take forever.
+_PATIENCE, _LEAST_PATIENCE = 20.0, 5.0
+# Longest text of a value, or of a question, in the table.
+_TEXT = 24
+# End of the first sentence of a comment, which says what a constant decides; the others give its source or the reason.
+_FIRST_SENTENCE: Final = re.compile(r"(?<=\.) (?=[A-Z_])")
 
 _HEAD: Final = (
     "constant",
     "value",
     "changed when halved",
     "changed when doubled",
+    "first changes",
     "what it decides",
+    "source or reason",
 )
-
-Number = float | int | tuple[float, ...]
-# A function of a file, by the name of the file and the line of its definition.
-Place = tuple[str, int]
-
-
-class Constant(NamedTuple):
-    """Numeric constant: its module, its value, and its comment."""
-
-    module: str
-    name: str
-    value: Number
-    comment: str
 
 
 class Baseline(NamedTuple):
-    """Unchanged answer to a question, its duration [s], and the functions it runs through."""
+    """Unchanged answer to a question, its duration [s], and the lines with constants that it runs."""
 
-    answer: str
+    answer: Answer
     seconds: float
-    places: frozenset[Place]
+    lines: frozenset[Line]
+
+
+class Outcome(NamedTuple):
+    """Number of questions asked with a scaled constant, and the changes of the answers by question."""
+
+    asked: int
+    changes: dict[str, str]
 
 
 class Row(NamedTuple):
-    """Result for a constant: its name without the package, its value, and the counts of changed answers as text."""
+    """Result for a constant: its name without the package, its value, and the changed answers as text."""
 
     name: str
     value: str
     halved: str
     doubled: str
+    changes: str
 
     @property
     def decides(self) -> bool:
@@ -80,241 +96,155 @@ class Row(NamedTuple):
         return any(not text.startswith("0 of") for text in (self.halved, self.doubled))
 
 
-class Outcome(NamedTuple):
-    """Number of questions asked with one scaled constant, and how many answers changed."""
-
-    asked: int
-    changed: int
+class OutOfTimeError(BaseException):
+    """A question takes far longer than usual."""
 
 
-def import_modules() -> list[ModuleType]:
-    """Import all modules of the package, so that a child process finds nothing left to import."""
-    names = [
-        module.name
-        for module in pkgutil.walk_packages(d2rpick.__path__, "d2rpick.")
-        if not module.name.endswith("__main__")
-    ]
-    return [importlib.import_module(name) for name in names]
+class Trials:
+    """Questions and constants, and how to ask the questions with scaled constants."""
+
+    def __init__(
+        self,
+        sources: Mapping[str, Source],
+        questions: Mapping[str, Question],
+        longest: float,
+    ) -> None:
+        self.sources = sources
+        self.questions = questions
+        self.constants = {
+            constant.short_name: constant for constant in find_constants(sources)
+        }
+        self.uses: dict[str, Uses] = {
+            name: find_uses(sources, constant)
+            for name, constant in self.constants.items()
+        }
+        all_lines = frozenset(
+            line for uses in self.uses.values() for line in uses.lines
+        )
+        baselines: dict[str, Baseline] = {
+            name: call_in_child(partial(measure_baseline, question, all_lines))
+            for name, question in questions.items()
+        }
+        self.baselines = {
+            name: baseline
+            for name, baseline in baselines.items()
+            if baseline.seconds <= longest
+        }
+
+    def find_touched(self, name: str) -> list[str]:
+        """List the questions that run a line with a constant, the quickest of each kind first."""
+        lines = self.uses[name].lines
+        touched = [
+            question
+            for question, baseline in self.baselines.items()
+            if not lines.isdisjoint(baseline.lines)
+        ]
+        by_kind: dict[str, list[str]] = defaultdict(list)
+        for question in sorted(touched, key=lambda name: self.baselines[name].seconds):
+            by_kind[question.split()[0]].append(question)
+        rounds = zip_longest(*by_kind.values())
+        return [question for one_round in rounds for question in one_round if question]
+
+    def try_factor(self, name: str, factor: float, seconds: float) -> Outcome:
+        """Ask questions with a scaled constant, until `ENOUGH` answers changed or the time is over."""
+        touched = self.find_touched(name)
+        return call_in_child(partial(self._ask, name, factor, touched, seconds))  # type: ignore[no-any-return]
+
+    def _ask(
+        self, name: str, factor: float, touched: Sequence[str], seconds: float
+    ) -> Outcome:
+        scale_constant(self.sources, self.constants[name], self.uses[name], factor)
+        changes: dict[str, str] = {}
+        asked_count = 0
+        start = time.process_time()
+        for question in touched:
+            is_late = time.process_time() - start > seconds
+            if asked_count and (is_late or len(changes) >= ENOUGH):
+                break
+            asked_count += 1
+            baseline = self.baselines[question]
+            answer = ask_safely(self.questions[question], baseline.seconds)
+            change = describe_change(baseline.answer, answer)
+            if change:
+                changes[question] = change
+        return Outcome(asked_count, changes)
 
 
-def find_constants(modules: Sequence[ModuleType]) -> list[Constant]:
-    """List the numeric constants at module level of `PACKAGES`; zeros and truth values are none."""
-    constants = []
-    for module in modules:
-        if module.__name__.split(".")[1] not in PACKAGES:
-            continue
-        lines = _read_source(module).split("\n")
-        for names, statement in _find_assignments(module):
-            comment = _find_comment(lines, statement)
-            for name in names:
-                value = getattr(module, name)
-                if _is_number(value):
-                    constants.append(Constant(module.__name__, name, value, comment))
-    return constants
-
-
-def _read_source(module: ModuleType) -> str:
-    return Path(str(module.__file__)).read_text(encoding="utf-8")
-
-
-def _find_assignments(
-    module: ModuleType,
-) -> Iterator[tuple[list[str], ast.Assign | ast.AnnAssign]]:
-    """Yield the names in capitals that the module assigns at its top level, with each statement."""
-    for statement in ast.parse(_read_source(module)).body:
-        if isinstance(statement, ast.Assign):
-            target = statement.targets[0]
-        elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
-            target = statement.target
-        else:
-            continue
-        elements = target.elts if isinstance(target, ast.Tuple) else [target]
-        names = [element.id for element in elements if isinstance(element, ast.Name)]
-        if names and all(name.isupper() for name in names):
-            yield names, statement
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, tuple) and value:
-        return all(_is_number(element) for element in value)
-    is_numeric = isinstance(value, float | int) and not isinstance(value, bool)
-    return is_numeric and value != 0
-
-
-def _find_comment(lines: Sequence[str], statement: ast.stmt) -> str:
-    """Return the comment above a statement, or at the end of its last line."""
-    above: list[str] = []
-    row = statement.lineno - 2
-    while row >= 0 and lines[row].startswith("#"):
-        above.insert(0, lines[row].lstrip("# "))
-        row -= 1
-    assert statement.end_lineno is not None
-    comment_on_line = lines[statement.end_lineno - 1].partition("  # ")[2]
-    return " ".join(above) or comment_on_line
-
-
-def ask_safely(question: Question) -> str:
+def ask_safely(question: Question, usual_seconds: float) -> Answer:
     """Return the answer to a question, or the first words of what went wrong."""
+
+    def stop(*_: object) -> None:
+        raise OutOfTimeError
+
+    signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, _PATIENCE * usual_seconds + _LEAST_PATIENCE)
     try:
         return question()
     except D2RPickError as refusal:
         return f"refused: {str(refusal)[-80:]}"
+    except OutOfTimeError:
+        return "takes far longer"
     except Exception as failure:  # noqa: BLE001  a scaled constant may break anything
         return f"failed: {type(failure).__name__}"
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
 
 
-def measure_baselines(questions: Mapping[str, Question]) -> dict[str, Baseline]:
-    """Ask each question twice: once for its time, once for the functions that it runs through."""
-    baselines = {}
-    for name, question in questions.items():
-        start = time.perf_counter()
-        answer = ask_safely(question)
-        seconds = time.perf_counter() - start
-        places_asked: set[Place] = set()
+def measure_baseline(question: Question, lines: frozenset[Line]) -> Baseline:
+    """Ask a question once, and note which of these lines it runs."""
+    lines_by_file: dict[str, set[int]] = defaultdict(set)
+    for line in lines:
+        lines_by_file[line.file].add(line.number)
+    lines_of_code: dict[CodeType, set[int]] = {}
+    lines_run: set[Line] = set()
 
-        def note_place(
-            frame: FrameType,
-            event: str,
-            _: object,
-            places_asked: set[Place] = places_asked,
-        ) -> None:
-            if event == "call":
-                code = frame.f_code
-                places_asked.add((code.co_filename, code.co_firstlineno))
+    def note_line(frame: FrameType, event: str, _: object) -> Any:
+        code = frame.f_code
+        if event == "line" and frame.f_lineno in lines_of_code[code]:
+            lines_run.add(Line(code.co_filename, frame.f_lineno))
+        return note_line
 
-        sys.setprofile(note_place)
-        try:
-            ask_safely(question)
-        finally:
-            sys.setprofile(None)
-        baselines[name] = Baseline(answer, seconds, frozenset(places_asked))
-    return baselines
+    def note_call(frame: FrameType, _: str, __: object) -> Any:
+        code = frame.f_code
+        if code not in lines_of_code:
+            numbers = {number for _, _, number in code.co_lines() if number}
+            lines_of_code[code] = numbers & lines_by_file.get(code.co_filename, set())
+        return note_line if lines_of_code[code] else None
 
-
-def find_users(modules: Sequence[ModuleType], constant: Constant) -> set[Place]:
-    """Find the functions that name a constant, or one that is computed from it, in all modules that know it."""
-    users = set()
-    for module, names in _find_bindings(modules, constant).items():
-        for code in _list_code(
-            compile(_read_source(module), str(module.__file__), "exec")
-        ):
-            if names & {*code.co_names}:
-                users.add((code.co_filename, code.co_firstlineno))
-    return users
-
-
-def _list_code(code: Any) -> Iterator[Any]:
-    """Yield the code of a module's functions, inner ones too."""
-    for inner in code.co_consts:
-        if hasattr(inner, "co_names"):
-            yield inner
-            yield from _list_code(inner)
-
-
-def _find_bindings(
-    modules: Sequence[ModuleType], constant: Constant
-) -> dict[ModuleType, set[str]]:
-    """For each module, the names that hold the constant or a constant computed from it."""
-    home = sys.modules[constant.module]
-    dependent = {constant.name}
-    for names, statement in _find_assignments(home):
-        assert statement.value is not None
-        used = {
-            node.id for node in ast.walk(statement.value) if isinstance(node, ast.Name)
-        }
-        if used & dependent:
-            dependent.update(names)
-    bindings = {home: dependent}
-    for module in modules:
-        if module is not home:
-            shared = {
-                name
-                for name in dependent
-                if getattr(module, name, None) is getattr(home, name)
-            }
-            if shared:
-                bindings[module] = shared
-    return bindings
-
-
-def scale(value: Number, factor: float) -> Number:
-    """Scale a number, or each of several; whole numbers stay whole and at least 1."""
-    if isinstance(value, tuple):
-        return tuple(scale(element, factor) for element in value)  # type: ignore[misc]
-    if isinstance(value, int):
-        return max(1, round(value * factor))
-    return value * factor
-
-
-def patch_constant(
-    modules: Sequence[ModuleType], constant: Constant, factor: float
-) -> None:
-    """Scale a constant in this process wherever a module or a default argument holds it."""
-    bindings = _find_bindings(modules, constant)
-    home = sys.modules[constant.module]
-    original_values = {name: getattr(home, name) for name in bindings[home]}
-    setattr(home, constant.name, scale(constant.value, factor))
-    for computed, statement in _find_assignments(home):
-        if constant.name not in computed and {*computed} & bindings[home]:
-            # computed from the constant: computed again
-            exec(compile(ast.Module([statement], []), "again", "exec"), vars(home))
-    patched_values = {name: getattr(home, name) for name in original_values}
-    replaced = {
-        id(original_values[name]): patched_values[name] for name in original_values
-    }
-    for module, names in bindings.items():
-        for name in names:
-            setattr(module, name, patched_values[name])
-    for module in modules:
-        for function in _list_functions(module):
-            defaults = function.__defaults__ or ()
-            if any(id(default) in replaced for default in defaults):
-                function.__defaults__ = tuple(
-                    replaced.get(id(default), default) for default in defaults
-                )
-
-
-def _list_functions(module: ModuleType) -> Iterator[FunctionType]:
-    for value in list(vars(module).values()):
-        if isinstance(value, FunctionType):
-            yield value
-        elif isinstance(value, type):
-            for member in list(vars(value).values()):
-                if isinstance(member, FunctionType):
-                    yield member
-
-
-def order_by_kind(names: Sequence[str], baselines: Mapping[str, Baseline]) -> list[str]:
-    """Order questions so that one of each kind comes first, the quickest, then the next of each kind."""
-    by_kind: dict[str, list[str]] = defaultdict(list)
-    for name in sorted(names, key=lambda name: baselines[name].seconds):
-        by_kind[name.split()[0]].append(name)
-    rounds = zip_longest(*by_kind.values())
-    return [name for round_names in rounds for name in round_names if name]
-
-
-def try_factor(
-    modules: Sequence[ModuleType],
-    constant: Constant,
-    factor: float,
-    questions: Mapping[str, Question],
-    baselines: Mapping[str, Baseline],
-    seconds: float,
-) -> Outcome:
-    """Ask the questions that run through the users of a constant, with the constant scaled, until it surely decides."""
-    users = find_users(modules, constant)
-    touched = [name for name in questions if users & baselines[name].places]
-    touched = order_by_kind(touched, baselines)
-    patch_constant(modules, constant, factor)
-    asked_count = changed = 0
     start = time.process_time()
-    for name in touched:
-        is_late = time.process_time() - start > seconds
-        if asked_count and (is_late or changed >= ENOUGH):
-            break
-        asked_count += 1
-        changed += ask_safely(questions[name]) != baselines[name].answer
-    return Outcome(asked_count, changed)
+    sys.settrace(note_call)
+    try:
+        answer = ask_safely(question, usual_seconds=60.0)
+    finally:
+        sys.settrace(None)
+    return Baseline(answer, time.process_time() - start, frozenset(lines_run))
+
+
+def describe_change(before: Answer, after: Answer, place: str = "") -> str:
+    """Return the first difference of two answers as ``place: before → after``; empty if there is none."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        for key in {**before, **after}:
+            change = describe_change(
+                before.get(key), after.get(key), f"{place}.{key}".strip(".")
+            )
+            if change:
+                return change
+        return ""
+    if isinstance(before, list | tuple) and isinstance(after, list | tuple):
+        if len(before) != len(after):
+            return f"{place}: {len(before)} → {len(after)} entries"
+        for number, pair in enumerate(zip(before, after, strict=True)):
+            change = describe_change(*pair, f"{place}[{number}]")
+            if change:
+                return change
+        return ""
+    if before == after:
+        return ""
+    texts = str(before), str(after)
+    equal = takewhile(lambda pair: pair[0] == pair[1], zip(*texts, strict=False))
+    first = max(len(list(equal)) - _TEXT // 2, 0)
+    short = [text if len(text) <= _TEXT else text[first:][:_TEXT] for text in texts]
+    return f"{place}: {short[0]} → {short[1]}"
 
 
 def call_in_child(function: Callable[[], Any]) -> Any:
@@ -333,32 +263,41 @@ def call_in_child(function: Callable[[], Any]) -> Any:
     return result
 
 
-def count_outcomes(constant: Constant, outcomes: Sequence[Outcome]) -> Row:
-    """Return the row of a constant that was tried."""
-    module = constant.module.removeprefix("d2rpick.")
-    counts = [f"{outcome.changed} of {outcome.asked}" for outcome in outcomes]
-    return Row(f"{module}.{constant.name}", f"{constant.value}", *counts)
+def make_row(constant: Constant, outcomes: Mapping[str, Outcome]) -> Row:
+    """Return the row of a constant from its outcomes when halved and when doubled."""
+    counts = {
+        way: f"{len(outcome.changes)} of {outcome.asked}"
+        for way, outcome in outcomes.items()
+    }
+    changes = [
+        f"{way}: {question[: 2 * _TEXT]}: {change}"
+        for way, outcome in outcomes.items()
+        for question, change in list(outcome.changes.items())[:1]
+    ]
+    return Row(
+        constant.short_name, f"{constant.value}", **counts, changes="; ".join(changes)
+    )
 
 
 def read_table(path: Path) -> dict[str, Row]:
-    """Return the tried rows of an earlier table by the names of their constants; empty without a table."""
+    """Return the rows of an earlier table by the names of their constants; empty without a table."""
     if not path.exists():
         return {}
     with path.open(encoding="utf-8", newline="") as file:
         lines = list(csv.reader(file))[1:]
-    return {line[0]: Row(*line[:4]) for line in lines if line[2]}
+    return {line[0]: Row(*line[:5]) for line in lines if line[2]}
 
 
 def write_table(
-    path: Path, constants: Sequence[Constant], rows: Mapping[str, Row]
+    path: Path, constants: Mapping[str, Constant], rows: Mapping[str, Row]
 ) -> None:
     """Write the table of all constants: those that decide an answer, the others, and those that were not tried."""
     lines = []
-    for constant in constants:
-        name = f"{constant.module.removeprefix('d2rpick.')}.{constant.name}"
-        row = rows.get(name, Row(name, f"{constant.value}", "", ""))
+    for name, constant in constants.items():
+        row = rows.get(name, Row(name, f"{constant.value}", "", "", ""))
         rank = 2 if not row.halved else int(not row.decides)
-        lines.append((rank, [*row, constant.comment]))
+        meaning, *sources = _FIRST_SENTENCE.split(constant.comment, maxsplit=1)
+        lines.append((rank, [*row, meaning, *(sources or [""])]))
     lines.sort(key=lambda line: line[0])
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -373,40 +312,34 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=2, help="records of each class")
     parser.add_argument("--seed", type=int, default=1, help="seed of the records")
     parser.add_argument(
-        "--seconds", type=float, default=6.0, help="time for each trial of a constant"
+        "--seconds", type=float, default=1.0, help="time for each trial of a constant"
+    )
+    parser.add_argument(
+        "--longest",
+        type=float,
+        default=3.0,
+        help="questions that take longer are left out [s, with line tracing]",
     )
     parser.add_argument("names", nargs="*", help="parts of the names of constants")
     options = parser.parse_args()
-    modules = import_modules()
-    constants = find_constants(modules)
+    sources = read_sources()
     rows = read_table(options.table)
     with TemporaryDirectory() as folder:
         questions = make_questions(options.records, options.seed, Path(folder))
-        baselines = call_in_child(lambda: measure_baselines(questions))
-        for constant in constants:
-            full_name = f"{constant.module}.{constant.name}"
-            row = rows.get(full_name.removeprefix("d2rpick."))
+        gc.freeze()
+        trials = Trials(sources, questions, options.longest)
+        for name, constant in trials.constants.items():
+            row = rows.get(name)
             is_known = row and row.decides and row.value == f"{constant.value}"
-            is_named = not options.names or any(
-                part in full_name for part in options.names
-            )
+            is_named = not options.names or any(part in name for part in options.names)
             if is_known or not is_named:
                 continue
-            trials = [
-                partial(
-                    try_factor,
-                    modules,
-                    constant,
-                    factor,
-                    questions,
-                    baselines,
-                    options.seconds,
-                )
-                for factor in FACTORS
-            ]
-            row = count_outcomes(constant, [call_in_child(trial) for trial in trials])
-            rows[row.name] = row
-            write_table(options.table, constants, rows)
+            outcomes = {
+                way: trials.try_factor(name, factor, options.seconds)
+                for way, factor in FACTORS.items()
+            }
+            rows[name] = make_row(constant, outcomes)
+            write_table(options.table, trials.constants, rows)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import shlex
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from click.testing import CliRunner
@@ -27,7 +27,9 @@ from tests.choice import test_same_answers
 from tests.command import ROOT
 from tests.written_runs import FALL_WRITERS, as_matsum
 
-Question = Callable[[], str]
+# Answer to a question: a JSON value with rounded numbers.
+Answer = Any
+Question = Callable[[], Answer]
 
 # Decimals of a residual whose change is a change of the answer; times are compared to this number of digits.
 _DECIMALS, _DIGITS = 3, 5
@@ -93,15 +95,6 @@ study --jobs 1 --td 0.064 sample_data/energy.csv sample_data/energy.glstat sampl
 study --jobs 1 --part box sample_data/rollover_box.matsum sample_data/rolloverT01.gz
 check sample_data/switching.k --history sample_data/energy.glstat
 """
-
-
-class PairText(NamedTuple):
-    """Recommended pair of a record, rounded as answers are compared."""
-
-    grade: str
-    basis: str
-    times: list[str]
-    sizes: list[float | None]
 
 
 def make_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
@@ -185,64 +178,64 @@ def _make_part_questions(records: int, seed: int) -> dict[str, Question]:
 
 def _answer_frozen_question(
     name: str, td: float | tuple[float, float], settings: Mapping[str, float | bool]
-) -> str:
+) -> Answer:
     suggestion = test_same_answers.suggest_for(name, td, **settings)
-    return str(test_same_answers.summarize(suggestion))
+    return test_same_answers.summarize(suggestion)._asdict()
 
 
 def _answer_record_question(
     path: str, reading: Mapping[str, Any], options: Mapping[str, Any]
-) -> str:
+) -> Answer:
     answer = d2rpick.suggest(d2rpick.read(path, **reading), **options).to_dict()
-    pair = answer["recommended"]
-    times = [f"{pair[time]:.{_DIGITS}g}" for time in ("tr", "td")] if pair else []
+    pair = answer["recommended"] or {}
     rows = [row for row in answer["candidates"] if row["recommended"]]
     best: Mapping[str, Any] = rows[0] if rows else {}
-    sizes = [best.get(key) for key in ("residual", "residual_low", "residual_high")]
-    return str(
-        PairText(
-            answer["quality"],
-            answer["basis"],
-            times,
-            [None if size is None else round(size, _DECIMALS) for size in sizes],
-        )
-    )
+    return {
+        "quality": answer["quality"],
+        "basis": answer["basis"],
+        "tr": _round_time(pair.get("tr")),
+        "td": _round_time(pair.get("td")),
+        "residual": _round_size(best.get("residual")),
+        "residual_low": _round_size(best.get("residual_low")),
+        "residual_high": _round_size(best.get("residual_high")),
+    }
 
 
-def _answer_part_question(record: promise_parts.PartsRecord) -> str:
+def _answer_part_question(record: promise_parts.PartsRecord) -> Answer:
     pair = promise_parts.recommend_pair(record)
     if pair is None:
         return "no pair"
-    times = [f"{time:.{_DIGITS}g}" for time in (pair.tr, pair.td)]
-    sizes = [
-        None if size is None else round(size, _DECIMALS)
-        for size in (pair.residual, pair.low, pair.high)
+    return {
+        "quality": pair.grade,
+        "basis": pair.basis,
+        "tr": _round_time(pair.tr),
+        "td": _round_time(pair.td),
+        "residual": _round_size(pair.residual),
+        "residual_low": _round_size(pair.low),
+        "residual_high": _round_size(pair.high),
+    }
+
+
+def _answer_flight_question(history: History) -> Answer:
+    return [
+        {
+            "start": _round_time(flight.start),
+            "end": _round_time(flight.end),
+            "unknown_load": flight.unknown_load,
+            "source": flight.source,
+        }
+        for flight in find_flights(history, Settings(replay=False))
     ]
-    return str(PairText(pair.grade, pair.basis, times, sizes))
 
 
-def _answer_flight_question(history: History) -> str:
-    return str(
-        [
-            (
-                _round(flight.start),
-                _round(flight.end),
-                flight.unknown_load,
-                flight.source,
-            )
-            for flight in find_flights(history, Settings(replay=False))
-        ]
-    )
-
-
-def _answer_command(command: str) -> str:
+def _answer_command(command: str) -> Answer:
     """Return the JSON document of a command line with rounded numbers, or its error."""
     words = shlex.split(command.format(data=ROOT / "tests" / "data"))
     words = [str(ROOT / word) if word.startswith("sample_") else word for word in words]
     result = CliRunner().invoke(d2rpick_command, [*words, "-q", "-f", "json"])
     if result.exit_code not in (0, 1):
         return re.sub(r"[\d.]+", "#", result.output)
-    return json.dumps(_round_document(json.loads(result.stdout)))
+    return _round_document(json.loads(result.stdout))
 
 
 def _round_document(value: object) -> object:
@@ -262,5 +255,9 @@ def _round_document(value: object) -> object:
     return value
 
 
-def _round(time: float | None) -> str | None:
+def _round_time(time: float | None) -> str | None:
     return None if time is None else f"{time:.{_DIGITS}g}"
+
+
+def _round_size(size: float | None) -> float | None:
+    return None if size is None else round(size, _DECIMALS)

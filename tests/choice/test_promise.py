@@ -61,6 +61,8 @@ def test_what_was_upside_down_has_the_sign_of_td(
         pytest.param("stiffness damping", 7, 1, marks=pytest.mark.slow),
         # The band is one-sided: other readings of the lines say less.
         ("exchange, 1 % noise", 6, 2),
+        # The first window begins in the load, and its modes convince all the same.
+        pytest.param("irregular", 505, 1, marks=pytest.mark.slow),
         pytest.param("10 modes, 1 % noise", 5, 0, marks=pytest.mark.slow),
         # A hardly longer pair beyond the limit of a good one.
         pytest.param("irregular", 6, 0, marks=pytest.mark.slow),
@@ -206,3 +208,11 @@ def test_the_truth_of_the_benchmark_is_that_of_its_motion() -> None:
             / ([1.3, 1.1] @ (state_at_td**2 + motion.state(td)[1] ** 2))
         )
     )
+
+
+def test_two_parts_of_one_rate_are_not_promised_to_be_exact() -> None:
+    """Their lines cancel, and what is left looks static but for its decay: 0.18 was stated, and called good."""
+    records = draw_records("parts with one mode each", seed=1, number=37)
+    pair = require(recommend_pair(next(islice(records, 36, None))))
+    assert pair.true == pytest.approx(require(pair.residual), abs=0.05)
+    assert pair.kept

@@ -15,7 +15,7 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import find_end_of_load
 from d2rpick.histories.history import History
 from d2rpick.vibration.oscillator import to_mode
-from d2rpick.vibration.span import Span, find_described_span
+from d2rpick.vibration.span import Span, SpanSearch, find_described_span
 from tests import paper
 from tests.computed import locate_stored, read_columns
 from tests.energies import require
@@ -112,7 +112,9 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> (
     None
 ):
-    span, fit = find_described_span(paper.make_history(), paper.TD, Span(0.0, 0.15))
+    span, fit = find_described_span(
+        SpanSearch(paper.make_history(), Span(0.0, 0.15)), paper.TD
+    )
     assert span == Span(0.0, 0.15)
     assert examine_td(paper.make_history(), paper.TD, Settings()).flight == Flight(
         0.0, None, "oscillator", described=True

@@ -16,5 +16,5 @@ def take_whole_record(
 ) -> GrowingEvidence:
     """Take all states of a record at once."""
     evidence = GrowingEvidence(given_wait, of_deck)
-    evidence.take(history)
+    evidence.take(history, history)
     return evidence

@@ -177,11 +177,11 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         result = run(*prepare_drive(tmp_path, "--resume"))
     if (
         fault == "damaged"
-    ):  # segment 4 fails on its restart file; only a second failure shows that this is the cause
+    ):  # segment 4 fails on its restart file, which segment 3 then writes again
         assert "strip_0004.out: the solver failed" in result.stderr
         result = run(*prepare_drive(tmp_path, "--resume"))
         assert (
-            "engine run 4 failed again before its first state; computing the engine run before it again"
+            "the last engine run is computed again from 0.032: the engine run after it has failed"
             in result.stderr
         )
     if fault in ("empty", "cut"):
@@ -257,7 +257,7 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
         path.write_bytes(b"")
     result = run(*prepare_drive(tmp_path, "--resume"))
     assert (
-        "the restart file of the last engine run is incomplete: the run goes back to 0"
+        "the last engine run is computed again from 0: its restart file is incomplete"
         in result.stderr
     )
     check_finished_run(json.loads(result.stdout), tmp_path)
@@ -265,7 +265,10 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
 
 
 def test_silence_is_measured_by_what_the_solver_writes(tmp_path: Path) -> None:
-    solver, then = engine.Solver(tmp_path, "strip"), time.time() - 100
+    solver, then = (
+        engine.Solver(tmp_path, "strip", engine.Commands()),
+        time.time() - 100,
+    )
     assert solver.silent_for() == 0.0
     os.utime(put(tmp_path / "stripT01", b"x"), (then, then))
     assert solver.silent_for() == pytest.approx(100, abs=5)
@@ -286,13 +289,13 @@ def test_a_leg_is_not_begun_on_a_full_disk(
     import shutil
 
     (tmp_path / "strip_0001_0001.rst").write_bytes(bytes(1000))
-    solver = engine.Solver(tmp_path, "strip")
+    solver = engine.Solver(tmp_path, "strip", engine.Commands())
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1999))
     with pytest.raises(D2RPickError, match="make room, then --resume"):
-        solver.check_room(2, 0.5)
+        solver.check_room(2)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=2000))
-    solver.check_room(2, 0.5)
+    solver.check_room(2)
     put(tmp_path / "strip_0001.log", b"TOTAL DISK SPACE USED")
     assert solver.last_words(1) == "TOTAL DISK SPACE USED"
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=999))
@@ -315,7 +318,7 @@ def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
 def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_first(
     tmp_path: Path,
 ) -> None:
-    solver, size = engine.Solver(tmp_path, "strip"), 1000
+    solver, size = engine.Solver(tmp_path, "strip", engine.Commands()), 1000
     for number in (0, 1):
         name = f"strip_{number:04d}_0001.rst"
         put(tmp_path / name, name.encode().ljust(size))
@@ -340,8 +343,10 @@ def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_firs
 
 
 def test_a_signal_that_ended_a_solver_is_told(tmp_path: Path) -> None:
-    solver = engine.Solver(tmp_path, "strip")
-    solver.start([sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"], 1)
+    kill = shlex.join([sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"])
+    commands = engine.Commands(engine=f"{kill} {{deck}}")
+    solver = engine.Solver(tmp_path, "strip", commands)
+    solver.start("engine", 1)
     while solver.alive:
         time.sleep(0.01)
     assert solver.last_words(1) == "ended by signal 9; nothing was printed"
@@ -356,7 +361,7 @@ def test_of_a_listing_the_lines_with_the_error_are_told(tmp_path: Path) -> None:
         *(f" more {n}" for n in range(99)),
     ]
     put(tmp_path / "strip_0000.out", "\n".join(lines).encode())
-    last_words = engine.Solver(tmp_path, "strip").last_words(0)
+    last_words = engine.Solver(tmp_path, "strip", engine.Commands()).last_words(0)
     assert last_words.startswith("** ERROR IN INPUT | LINE 12: NODE 7 IS NOT DEFINED")
 
 

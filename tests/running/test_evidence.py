@@ -16,8 +16,8 @@ from d2rpick.choice.td.flights import find_flights
 from d2rpick.histories.history import EXACT, Given, History, Momenta, select_states
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.events import find_events
-from d2rpick.running.evidence import GrowingEvidence, highest_energy
+from d2rpick.running.events import find_events, highest_energy
+from d2rpick.running.evidence import GrowingEvidence
 from d2rpick.running.inner_motion import Wait
 from d2rpick.running.witness import Quiet
 from tests.command import ROOT
@@ -224,9 +224,10 @@ def test_what_is_seen_does_not_depend_on_when_somebody_looked(
         states = np.zeros(history.time.size, np.bool_)
         states[begin : begin + size] = True
         begin += size
+        states_so_far = np.arange(history.time.size) < begin
         if not states.any():
             break
-        evidence.take(take_states(history, states))
+        evidence.take(take_states(history, states), take_states(history, states_so_far))
         evidence.flights()
     assert evidence.flights() == whole.flights()
     assert [witness.free for witness in evidence.witnesses] == [

@@ -14,6 +14,7 @@ from d2rpick.running.events import Event
 from d2rpick.running.looks import Looks
 from d2rpick.running.watch import Watch
 from tests.command import ROOT
+from tests.energies import require
 from tests.histories.test_contact_forces import rcforc
 from tests.made_binout import make_binout
 from tests.written_runs import FALL_WRITERS, WRITERS, Written, as_glstat
@@ -147,7 +148,7 @@ def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
     assert np.array_equal(np.concatenate(energies), whole.energy)
     assert not times[-1].size  # nothing was written since the previous look
     assert len(times) > 2
-    assert looks.grow is (form != "momenta")
+    assert bool(looks.resume_points) is (form != "momenta")
 
 
 def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
@@ -291,7 +292,7 @@ def test_both_branches_of_a_binout_are_read_on_wherever_it_ends(
         path.write_bytes(data[: mark + 5])
         states, follows = looks.new_states([str(path)])
         assert follows is bool(pieces)
-        assert looks.grow
+        assert looks.resume_points
         pieces.append(states)
     assert np.array_equal(np.concatenate([piece.time for piece in pieces]), whole.time)
     for number, momenta in enumerate(whole.momenta):
@@ -324,3 +325,24 @@ def test_the_events_of_a_file_that_grows_are_those_of_the_whole_file(
         watch_event for watch_event in whole if watch_event.event != "begun"
     ]
     assert "flight" in {watch_event.event for watch_event in watch_events}
+
+
+def test_a_growing_matsum_shows_the_flight_that_the_whole_one_shows(
+    tmp_path: Path,
+) -> None:
+    """Its masses are lower bounds from the states that were read: the last states alone show 145 of 350 kg."""
+    data = (ROOT / "sample_data" / "rollover_box.matsum").read_bytes()
+    watch = Watch([str(tmp_path / "matsum")], Selection(parts=("box",)))
+    events = list[Event]()
+    for share in (0.3, 0.45, 0.5, 0.55, 0.6, 0.65, 1.0):
+        (tmp_path / "matsum").write_bytes(data[: int(share * len(data))])
+        events += watch.news()
+    whole = Watch(
+        [str(ROOT / "sample_data" / "rollover_box.matsum")], Selection(parts=("box",))
+    )
+    kinds = ("flight", "switch", "contact")
+    assert [event[:3] for event in events if event.event in kinds] == [
+        event[:3] for event in whole.news() if event.event in kinds
+    ]
+    masses = require(watch.looks.evidence.history.momenta[0].masses)
+    assert masses == pytest.approx([350.0, 6.0], rel=1e-3)

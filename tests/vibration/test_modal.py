@@ -50,6 +50,66 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
 
 
+@settings(max_examples=8, deadline=None)
+@given(
+    st.integers(0, 10**6),
+    st.floats(0.03, 0.9),
+    st.floats(0.5, np.pi),
+    st.sampled_from([0.0, 3.0]),
+)
+def test_modes_whose_lines_cancel_are_known_by_their_decay(
+    seed: int, share: float, turned: float, static: float
+) -> None:
+    """Two modes of one rate, as of a square box, have one line: what its height lacks falls as the vibration does."""
+    first = LinearStructure.draw(seed, 1)
+    pair = LinearStructure(
+        np.array([1.0, np.sqrt(share)]),
+        np.full(2, 0.1),
+        np.repeat(first.rate, 2),
+        first.phase[0] + np.array([0.0, turned / 2]),
+    )
+    modal = require(identify_modal(TIME, pair.elastic_energy(TIME) + static))
+    true = pair.residual(*PAIRS)
+    assert np.abs(compute_residuals(modal, *PAIRS) - true).max() < 0.03
+
+
+def test_a_static_energy_that_stays_hides_no_modes() -> None:
+    structure = LinearStructure.draw(4, 3)
+    modal = require(identify_modal(TIME, structure.elastic_energy(TIME) + 7.0))
+    assert modal.reading.hidden_pairs < 1e-3
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10**6), st.floats(0.5, 0.95), st.sampled_from([0.0, 3.0]))
+def test_a_mode_slower_than_the_record_is_no_static_energy(
+    seed: int, turns: float, static: float
+) -> None:
+    """A mode whose energy does not come back within the flight vibrates all the same, and is known less well."""
+    fast = LinearStructure.draw(seed, 3)
+    slow_rate = np.pi * turns / TIME[-1]
+    structure = fast._replace(
+        rate=np.append(slow_rate, fast.rate[1:]),
+        damping=np.full(3, 0.05),
+    )
+    modal = require(identify_modal(TIME, structure.elastic_energy(TIME) + static))
+    true = structure.residual(*PAIRS)
+    stated = compute_residuals(modal, *PAIRS)
+    assert np.sqrt(np.mean((stated - true) ** 2)) < 0.03
+    _, low, high = modal.residual_band(stated, *PAIRS)
+    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
+
+
+@pytest.mark.parametrize("drift", [0.1, 0.5, 3.0])
+def test_an_energy_that_drifts_is_no_slow_mode(drift: float) -> None:
+    structure = LinearStructure.draw(4, 3)
+    energy = structure.elastic_energy(TIME)
+    drifting = drift * np.ptp(energy) * TIME / TIME[-1]
+    modal = require(identify_modal(TIME, energy + drifting))
+    assert modal.signed, modal.doubts
+    true = structure.residual(*PAIRS)
+    assert np.sqrt(np.mean((compute_residuals(modal, *PAIRS) - true) ** 2)) < 0.02
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 4), st.sampled_from([0.01, 0.02]))
 def test_noise_widens_the_band_and_the_truth_stays_in_it(
@@ -119,6 +179,24 @@ def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
         confirm_by_kinetic_energy(lacking, kinetic) is lacking
     )  # it holds less than what vibrates
     assert "kinetic energy" in kinetic.told
+
+
+def test_the_kinetic_energy_does_not_decide_where_a_deformation_relaxes() -> None:
+    """A deformation that creeps back moves the parts, and hardly any of its energy is kinetic."""
+    structure = LinearStructure.draw(4, 3)
+    kinetic = require(
+        identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True)
+    )
+    relaxing = 40.0 * np.exp(-TIME / 2.0)
+    falling = require(identify_modal(TIME, structure.elastic_energy(TIME) + relaxing))
+    assert not falling.signed
+    assert confirm_by_kinetic_energy(falling, kinetic) is falling
+    rising = require(
+        identify_modal(TIME, structure.elastic_energy(TIME) - relaxing + 40.0)
+    )
+    assert rising.signed, (
+        rising.doubts
+    )  # Heat rises so, and the lines stay as they are.
 
 
 @pytest.mark.parametrize("stretch", [0.3, 1.0])

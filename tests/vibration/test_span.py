@@ -14,6 +14,7 @@ from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator_band import residual_band
 from d2rpick.vibration.span import (
     Span,
+    SpanSearch,
     estimate_hidden_share,
     find_described_span,
     find_span,
@@ -73,7 +74,9 @@ def test_a_span_ends_where_running_means_leave_the_fit(
 def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     rng = np.random.default_rng(1)
     energy = rng.normal(size=TIME.size)
-    span, fit = find_described_span(make_history(energy), 0.1, Span(0.0, 0.15))
+    span, fit = find_described_span(
+        SpanSearch(make_history(energy), Span(0.0, 0.15)), 0.1
+    )
     assert span is None
     early = TIME <= 0.1
     assert fit.reason == identify(TIME[early], energy[early]).reason
@@ -91,7 +94,7 @@ def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record
     energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
     tracemalloc.start()
     span, fit = find_described_span(
-        make_table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
+        SpanSearch(make_table(np.arange(2000.0), energy), Span(0.0, 1999.0)), 1000.0
     )
     peak_memory = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.situation import Situation
 
+# Number of extrema of the energy in each of its periods: a minimum and a maximum.
 _TURNS_PER_PERIOD: Final = 2
 # Files for which LS-DYNA usually has a shorter output interval than for d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")

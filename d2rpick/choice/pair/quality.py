@@ -43,7 +43,7 @@ ROUNDING: Final = 1e-3
 # Number of decimals to which errors are rounded before comparison, so that round-off does not affect the ranking.
 _DECIMALS: Final = 4
 # Largest relative difference from the longest rigid time at which rigid times are treated as equal [-].
-_LIKE_TIMES = 0.1
+LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
@@ -66,6 +66,8 @@ _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 _CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
+# End of the advice on a pair; it is omitted if the finished switched run is already available.
+_OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 def rank_candidates(
@@ -187,7 +189,7 @@ def order_by_quality(
     longest = _find_extremes(
         np.maximum, group, np.where(is_like, rigid, -np.inf), groups
     )
-    is_long = is_like & (rigid >= (1 - _LIKE_TIMES) * longest[group])
+    is_long = is_like & (rigid >= (1 - LIKE_TIMES) * longest[group])
     smallest_of_long = _find_extremes(
         np.minimum, group, np.where(is_long, error, np.inf), groups
     )
@@ -236,10 +238,6 @@ def list_exceeded_limits(
             is_td_wrong = of_td and quantity is not None
             exceeded.append(Excess(limit.explain(quantity, value), is_td_wrong))
     return tuple(exceeded)
-
-
-# End of the advice on a pair; it is omitted if the finished switched run is already available.
-_OR_COMPARE: Final = ", or compare with a finished switched run"
 
 
 class Cause(NamedTuple):
@@ -506,12 +504,12 @@ def _list_causes_of_record(
         )
     states = count_states_per_period(energy)
     if states is not None and states < MIN_SAMPLES_PER_PERIOD:
-        states_text = f"the record has {states:.3g} states per period"
+        states_text = f"the energy has {states:.3g} states per period"
         causes.append(
             Cause(
                 f"{states_text}, at least {MIN_SAMPLES_PER_PERIOD} are needed to compare energies",
                 f"{_MORE_OFTEN}, at least {MIN_SAMPLES_PER_PERIOD / states:.2g} times as often",
-                kind=f"the record has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
+                kind=f"the energy has fewer than {MIN_SAMPLES_PER_PERIOD} states per period",
             )
         )
     return tuple(causes)

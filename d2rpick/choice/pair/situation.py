@@ -28,7 +28,7 @@ from d2rpick.vibration.model import (
     is_doubtful,
     model_at,
 )
-from d2rpick.vibration.span import Span, find_oscillator, limit_bounds
+from d2rpick.vibration.span import Span, SpanSearch, find_oscillator, limit_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -288,15 +288,10 @@ def examine_td(
         bounds = limit_bounds(
             _get_bounds(history, seen), fitted_at, settings.after, settings.landing
         )
-        span, fit = find_oscillator(
-            history,
-            fitted_at,
-            bounds,
-            oscillator=settings.oscillator,
-            fit_window=settings.fit_window,
-            whole=is_shown,
-            quick=quick,
+        search = SpanSearch(
+            history, bounds, settings.oscillator, whole=is_shown, quick=quick
         )
+        span, fit = find_oscillator(search, fitted_at, settings.fit_window)
     described = _skip_first_quarter(history, fit, span)
     quiet: QuietTime | None = None
     is_given = settings.oscillator is not None or settings.fit_window is not None

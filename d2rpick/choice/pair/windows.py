@@ -22,14 +22,13 @@ if TYPE_CHECKING:
     # A function that tests times, and returns True for each time that passes the test.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Number of bisections that locate the end of a window to within 1e-6 of the sampling interval.
-_END_HALVINGS: Final = 20
-_BELOW = 1e-12
+# Largest number of halvings of a sampling interval, with which the end of a window is found to 1e-6 of the interval.
+_HALVINGS: Final = 20
+# Relative margin by which a level lies below the highest energy, so that rounding does not hide the crossing [-].
+_BELOW: Final = 1e-12
 
 # Largest deviation of the error from its polyline [-]; this is half a unit of the last printed digit.
 _EXACT: Final = 5e-4
-# Largest number of halvings of an interval in which the error curve is not straight.
-_HALVINGS: Final = 20
 
 
 def find_acceptable_windows(
@@ -230,7 +229,7 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
         return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
     return narrow_brackets(
-        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_END_HALVINGS
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_HALVINGS
     ).within
 
 

@@ -57,6 +57,7 @@ _DOUBT: Final = 0.1
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
+# Microseconds per second.
 _US: Final = 1e6
 
 
@@ -386,11 +387,7 @@ def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
     """Return the average numbers of deformable elements and integration points by class, and of rigid-body nodes."""
-    always = {
-        part
-        for part, data in inventory.parts.items()
-        if data.material and data.material.kind == "rigid"
-    }
+    always = inventory.rigid_parts
     computed: dict[str, float] = {}
     _add_counts(
         computed,

@@ -136,11 +136,7 @@ class CostModel:
     def __init__(self, inventory: Inventory, weights: Weights | None = None) -> None:
         self.inventory = inventory
         self.weights = weights or Weights()
-        self._rigid = {
-            part
-            for part, data in inventory.parts.items()
-            if data.material and data.material.kind == "rigid"
-        }
+        self._rigid = inventory.rigid_parts
 
     def of_part(self, part: int) -> Amount:
         """Return the cost of the elements of a part."""

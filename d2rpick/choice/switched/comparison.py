@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched.frozen import FEWEST, SAME
+from d2rpick.choice.switched.frozen import FEWEST
 from d2rpick.choice.switched.switched_run import choose_same_parts
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 from d2rpick.vibration import measures
 
@@ -263,7 +264,7 @@ def _find_limit_of_change(
 ) -> float:
     """Return the largest change of an energy that is treated as constant [energy]; it covers the rounding error."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
-    digits = max(SAME * level, switched.energy_precision.quantum(level))
+    digits = max(LAST_DIGIT * level, switched.energy_precision.quantum(level))
     vibrates = _compute_energy_range(reference, tr, td)
     rounding = round_off(reference)
     if level + vibrates <= rounding:
@@ -394,7 +395,9 @@ def find_switch_times(switched: History, reference: History) -> tuple[float, flo
     """
     time = switched.time
     energy = switched.energy
-    limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
+    limit = np.maximum(
+        LAST_DIGIT * np.abs(energy), switched.energy_precision.quanta(energy)
+    )
     rounding = round_off(reference)
     # The energies of rigid or resting parts are only round-off, which may change during a fall.
     unchanged = np.abs(np.diff(energy)) <= np.maximum(limit[1:], rounding)

@@ -13,6 +13,7 @@ import numpy as np
 from d2rpick.base.errors import RangeError, list_names
 from d2rpick.base.memory import remember
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.samples import find_stretches
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 # Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
-# Relative change below which an internal energy is constant [-]; solvers write energies in single precision.
-SAME: Final = 1e-6
 # Smallest change of a vibrating energy, in multiples of the change up to which an energy is constant [-].
 _MUCH: Final = 100.0
 
@@ -31,7 +30,9 @@ _MUCH: Final = 100.0
 def find_frozen_times(history: History) -> tuple[Times, ...]:
     """Return the windows in which the energy suddenly becomes constant, up to a fall [time]."""
     energy = history.energy
-    limits = np.maximum(SAME * np.abs(energy), history.energy_precision.quanta(energy))
+    limits = np.maximum(
+        LAST_DIGIT * np.abs(energy), history.energy_precision.quanta(energy)
+    )
     unchanged = np.abs(np.diff(energy)) <= limits[1:]
     stretches = find_stretches(np.append(False, unchanged), FEWEST)
     time = history.time

@@ -20,9 +20,10 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.switched.frozen import FEWEST, SAME, find_frozen_times
+from d2rpick.choice.switched.frozen import FEWEST, find_frozen_times
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import find_complete_stretches
+from d2rpick.flight.window import LAST_DIGIT
 from d2rpick.histories.history import Given, History
 from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.samples import find_stretches, find_window
@@ -379,7 +380,7 @@ def detect_rigid_parts(
         return None
     energies = run.part_energies(parts)[inside]
     kinetic = give_if_written(lambda: run.part_kinetic_energies(parts))
-    still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
+    still = np.ptp(energies, axis=0) <= LAST_DIGIT * np.abs(energies).max(axis=0)
     if kinetic is not None:
         absent = (kinetic[inside] == 0).all(axis=0)
     else:

@@ -12,6 +12,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.quality import (
     EQUALLY_GOOD,
     LIKE_LEVELS,
+    LIKE_TIMES,
     ROUNDING,
     get_limit_of_like_quality,
     is_good_residual,
@@ -22,7 +23,7 @@ from d2rpick.choice.pair.quality import (
 from d2rpick.choice.pair.situation import Situation, make_look
 from d2rpick.choice.pair.warnings import compute_mean_in_flight, compute_shortfall
 from d2rpick.choice.td.flights import MIN_RIGID, find_longest_flight
-from d2rpick.flight.flight import SOURCES
+from d2rpick.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import round_down_as_read, sum_times_as_read
 from d2rpick.histories.samples import merge_times
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
 _MOST_PEAKS: Final = 12
 # Smallest lengths of the windows compared for many modes, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
-# Smallest relative length at which good windows are treated as equally long as the longest good window [-].
-_LONG: Final = 0.9
 _FEWEST_TD, _MOST_TD = 3, 1000
 # Number of td in a uniform grid; it suffices for a smooth curve on paper and on a screen.
 STEPS: Final = 200
@@ -380,11 +379,9 @@ def _rate_certainty(
     low, high = window
     start, end = situation.flight.within(situation.history.time)
     only_ends_in_it = min(end, high) - max(start, low) < MIN_RIGID * (high - low)
-    return (
-        not situation.in_flight,
-        SOURCES.index(situation.flight.source),
-        only_ends_in_it,
-    )
+    source = situation.flight.source
+    rank = len(SOURCES) if source is None else SOURCES.index(source)
+    return not situation.in_flight, rank, only_ends_in_it
 
 
 def _choose_by_residual(
@@ -481,7 +478,9 @@ def _select_within_band(pairs: Sequence[Choice]) -> list[Choice]:
 def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
     """Return the choice with the smallest error among the choices that are hardly shorter than the longest one."""
     longest = max(pair.rigid_time for _, pair in pairs)
-    long = [choice for choice in pairs if choice[1].rigid_time >= _LONG * longest]
+    long = [
+        choice for choice in pairs if choice[1].rigid_time >= (1 - LIKE_TIMES) * longest
+    ]
     return min(long, key=lambda choice: (choice[1].error, -choice[1].rigid_time))
 
 

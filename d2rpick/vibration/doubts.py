@@ -1,0 +1,150 @@
+"""Measure what speaks against the record of a linear structure in free flight, and say why a record is refused."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration.locked_lines import measure_harmonics
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.lines import Grid, Prediction
+    from d2rpick.vibration.locked_lines import StretchLine
+    from d2rpick.vibration.midpoint import Reading
+
+# Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
+_CHECKED: Final = 90
+
+# Largest prediction error of an accepted record, relative to the range of the energy [-].
+_MOST_MISSED: Final = 0.5
+# Largest misfit of an accepted record, relative to the range of the energy [-].
+_MOST_MISFIT: Final = 0.3
+# MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
+# _MOST_NEGATIVE_AT_ALL: limit that replaces MOST_NEGATIVE if there is no better model [-].
+MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
+# Largest change of the static energy in an accepted record, relative to the mean vibration energy [-].
+_MOST_DRIFT: Final = 0.6
+# Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
+MOST_BEYOND: Final = 0.12
+# Largest size of the harmonics in an accepted record, relative to their fundamental line [-].
+_MOST_HARMONIC: Final = 0.05
+# _MOST_UNSTRETCHED: largest deficit of static energy for a static deformation, per mean vibration energy [-].
+# _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
+_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
+# Smallest number of states in an accepted record per period of the highest-frequency strong line.
+_FEWEST_PER_PERIOD: Final = 2.4
+
+
+class Doubts(NamedTuple):
+    """Indications that a record is not that of a linear structure in free flight; 0 means that there is no doubt [-].
+
+    ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
+    the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
+    one, relative to it; ``coarse`` is the number of states per period of the fastest strong line.
+    """
+
+    missed: float
+    misfit: float
+    negative: float
+    drift: float
+    beyond: float
+    harmonic: float
+    unstretched: float
+    coarse: float
+
+    @property
+    def refusal(self) -> str | None:
+        """Return the reason why the record is refused; None if it is accepted."""
+        return self._first_of(MOST_NEGATIVE, _MOST_UNSTRETCHED)
+
+    @property
+    def refusal_at_all(self) -> str | None:
+        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
+        return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
+
+    def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
+        """Return the first reason why the record is refused under the given limits; None if there is no reason."""
+        reasons = (
+            (
+                self.coarse < _FEWEST_PER_PERIOD,
+                f"{self.coarse:.2g} states per period of the energy are too few",
+            ),
+            (
+                self.missed > _MOST_MISSED,
+                "the first part of the flight does not predict the rest",
+            ),
+            (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),
+            (self.negative > most_negative, "the lines hold more energy than there is"),
+            (
+                self.drift > _MOST_DRIFT,
+                "the mean energy changes in the flight by as much as vibrates",
+            ),
+            (
+                self.beyond > MOST_BEYOND,
+                "the energy halfway is beyond what any deformations allow",
+            ),
+            (
+                self.harmonic > _MOST_HARMONIC,
+                "the lines are harmonics of one another, as those of a nonlinear spring",
+            ),
+            (
+                self.unstretched > most_unstretched,
+                "lines at half the rate of others hold more than the static energy",
+            ),
+        )
+        return next((reason for holds, reason in reasons if holds), None)
+
+
+class StaticEnergy(NamedTuple):
+    """Static part of the mean energy.
+
+    ``energy`` (n,) is its course at the times of the grid [energy], ``mean`` the mean elastic energy of the modes
+    [energy], and ``share`` the mean static energy relative to it [-].
+    """
+
+    energy: Samples
+    mean: float
+    share: float
+
+
+def measure_doubts(
+    reading: Reading,
+    static: StaticEnergy,
+    prediction: Prediction,
+    grid: Grid,
+    stretches: tuple[StretchLine, ...],
+    scatter: float,
+) -> Doubts:
+    """Measure what speaks against a reading of the lines of an internal energy, of which a part is static."""
+    spectrum = prediction.spectrum
+    mean, share = static.mean, static.share
+    line_count = spectrum.lines.poles.size
+    in_stretches = sum(stretch.energy for stretch in stretches) / mean
+    unstretched = 0.0
+    if stretches:
+        unstretched = max(in_stretches - share, 0.0) / (1 + max(share, 0.0))
+    return Doubts(
+        missed=prediction.missed,
+        misfit=spectrum.error / prediction.swing,
+        negative=max(-share - 2 * line_count * scatter / mean, 0.0),
+        drift=float(np.std(static.energy)) / mean,
+        beyond=_measure_beyond_bounds(reading, grid),
+        harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
+        unstretched=unstretched,
+        coarse=grid.strong,
+    )
+
+
+def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
+    """Return the excess of the overlap over its bounds, relative to the vibration energy (rms over pairs) [-]."""
+    even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
+    pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
+    tr, td = pairs.T
+    beyond = np.maximum(
+        np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0
+    )
+    return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))

@@ -1,0 +1,62 @@
+"""Find vibration energy that the lines of a record do not show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.vibration.locked_lines import ABOVE_SCATTER
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+
+# Largest relative variation of a constant level [-], which single precision cannot resolve.
+_RESOLVED: Final = 2e-7
+# _LIKE_LEVEL: largest part of the variation of a static energy that does not fall with the level, as a fraction [-].
+# _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
+_LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
+# Assumed number of lines that are hidden in the misfit.
+_HIDDEN_LINES: Final = 12
+
+
+def measure_hidden_pairs(
+    static: Samples, level: Samples, noise: float, systematic: float
+) -> float:
+    """Return the vibration energy that falls as the ``level`` does but has no lines, relative to the level [-].
+
+    The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
+    But static energy stays as it is, while that of modes decays with all others.
+
+    Parameters
+    ----------
+    static, level : array of shape (n,)
+        Mean energy beyond half of the level, and energy of the lines, at equidistant times [energy].
+    noise : float
+        Standard deviation of the record about its lines [energy].
+    systematic : float
+        Fraction of the misfit that neighbouring states have in common [-].
+    """
+    fallen = level - np.mean(level)
+    variance = float(np.mean(fallen**2))
+    if variance <= (_RESOLVED * float(np.mean(level))) ** 2:
+        return 0.0
+    share = float(np.mean(fallen * static)) / variance
+    left = static - np.mean(static) - share * fallen
+    shared = min(systematic, _MOST_SHARED)
+    states = static.size * (1 - shared) / (1 + shared)
+    scatter = noise / np.sqrt(states * variance)
+    is_seen = share > ABOVE_SCATTER * scatter
+    if not is_seen or float(np.mean(left**2)) > (_LIKE_LEVEL * share) ** 2 * variance:
+        return 0.0
+    return 2 * max(min(share, float(np.min(static / level))), 0.0)
+
+
+def find_most_hidden(rest: Samples) -> float:
+    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
+
+    None of them is higher than the highest line of the rest, and together they are no more than the rest.
+    """
+    highest = 2 * float(np.abs(np.fft.rfft(rest)).max()) / rest.size
+    most_together = np.sqrt(2 * np.mean(rest**2) / _HIDDEN_LINES)
+    return float(2 * _HIDDEN_LINES * min(highest, most_together))
