@@ -29,7 +29,7 @@ gravity acts.
 
 from typing import Final
 
-# Names of the data that can show a flight, with the most reliable first.
+# Names of the data that can show a flight, from most to least reliable.
 SOURCES: Final = (
     "given",
     "momentum",

@@ -372,7 +372,7 @@ def _find_flight_by_momentum(
 def _limit_to_undriven(
     history: History, flight: FreeFlight, td: float
 ) -> FreeFlight | None:
-    """Return the part of a flight by momentum in which no load does work on the model; None if one does at td.
+    """Return the part of a flight shown by the momentum in which no load does work; None if one does at td.
 
     Opposite forces, and weak ones, drive the model although its momentum hardly shows them.
     """
@@ -417,7 +417,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces; if the energy rises, only the part with a steady energy level.
+    """Return the flight around td from contact forces; if the energy rises, return the part with a steady level.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """

@@ -42,7 +42,7 @@ _REACH_OF_DIGITS = 10.0
 # _ALONG_AXIS: smallest direction cosine between gravity and an axis while a load fades [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
 # _DAMPED: largest momentum loss in a window that is always attributed to damping, relative to the momentum [-].
-# _LEFT: a larger loss is attributed to damping if at least this fraction of the largest momentum remains [-].
+# _LEFT: a loss above _DAMPED is attributed to damping if this fraction of the largest momentum remains [-].
 _DAMPED, _LEFT = 0.2, 0.05
 # Largest momentum loss between successive states that is attributed to damping, relative to the momentum [-].
 _SHOWN = 0.1

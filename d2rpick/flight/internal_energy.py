@@ -34,10 +34,10 @@ _WAIT: Final = 1 / 3
 # _FASTER: smallest rate of change that shows a contact, relative to the usual rate of change before td [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # Averaging time for the level of the energy, as a fraction of the time without load [-].
-# The level has changed once the mean energy leaves the band of the means before td, widened by its width at both ends.
+# The level has changed once the mean energy leaves the range of the means before td, extended by its width both ways.
 _LEVEL: Final = 1 / 8
 # _KNOWN: fraction of the time before a possible landing that sets the energy range for comparison [-].
-# _TURNED: smallest number of energy extrema in this comparison time.
+# _TURNED: smallest number of energy extrema that are required in the time that sets this range.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
@@ -47,7 +47,7 @@ _RESERVE: Final = 0.5
 # A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
 # A steady drift changes the mean energies of the two quarters by the width of the energy band.
 _DRIFT: Final = 0.35
-# Smallest number of oscillations of a slow vibration over at least half of its range; a crash has fewer.
+# A slow vibration swings through half of its energy range at least this often; a crash swings less often.
 _SWINGS: Final = 4
 # Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75
@@ -179,7 +179,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, states: slice) -> float | None:
-    """Return the time of the last of some states at which the energy is far from its usual values [time], or None."""
+    """Among some states, return the time of the last one at which the energy is far from its usual values, or None."""
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
@@ -189,7 +189,7 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
 
 
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
-    """Return the time of the last of some states to which the energy changes much faster than usual [time], or None.
+    """Among some states, return the time of the last one to which the energy changes much faster than usual, or None.
 
     Usual are the rates from the time ``latest`` on.
     """
@@ -209,7 +209,7 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the energy leaves its band in these states [time], or None."""
+    """Return the first time after some states at which the energy leaves the band of these states [time], or None."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# Largest relative change of its relative velocity for a part that is not connected to the body [-].
+# A part whose relative velocity changes by no more than this fraction is not connected to the body [-].
 # The relative velocity of a connected part changes by more than this once the body has rotated by 0.01 degrees.
 _STEADY: Final = 1e-4
 # Largest deformation of the other parts at which a position error is exact, relative to the part's motion [-].

@@ -29,7 +29,7 @@ _MOST_STEPS: Final = 25
 # _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Sums of m r^2, about an axis or unexplained by a rotation, are treated as zero below this fraction of another [-].
+# A sum of m r^2, about an axis or left unexplained, is treated as zero below this fraction of the full sum [-].
 _VANISHING: Final = 1e-6
 # Numbers of periods per record that are tried as starting values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))

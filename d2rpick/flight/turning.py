@@ -178,7 +178,7 @@ def follow_turning(
     placement: Placement,
     displacements: Displacements | None = None,
 ) -> Turning | None:
-    """Follow the orientation of the body that consists of given parts, from the deck positions of all flying parts.
+    """Follow the orientation of the body formed by the given parts, from the deck positions of all flying parts.
 
     ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, or
     neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.

@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 # _TIGHTER: factor by which the tolerance is repeatedly reduced as long as the window keeps its length [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
 # _STAYS: a window that retains at least this fraction of its length is treated as unchanged [-].
-# _STANDS: if a window shrinks at one end, largest shift of the other, unchanged end, relative to the window [-].
+# _STANDS: largest shift of the other end of a window that shrinks at one end only, relative to the window [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # Smallest misfit of a vibration in the middle half of a window, relative to the misfit in the whole window [-].
 # For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.
