@@ -43,7 +43,7 @@ JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
 # With this time step, a rigid engine run costs a few percent of a deformable one and still resolves contacts.
 _STEP_RATIO: Final = 5.0
-# A flight too short to be switched is reported from this duration on, as a fraction of the required time [-].
+# A flight too short to be switched is reported if it lasts at least this fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
 # _SILENT: time without solver output after which the driver reports this silence [s].
@@ -337,7 +337,7 @@ class Journal:
 
     @property
     def has_failed(self) -> bool:
-        """True if the next engine run has already failed before."""
+        """True if the next engine run has failed before."""
         events = [record["event"] for record in self.records]
         return [event for event in events if event != "started"][-1:] == ["failed"]
 

@@ -1,4 +1,4 @@
-"""Find the flights of given parts in a growing record.
+"""Find the flights of the given parts in a growing record.
 
 Each result depends only on the states up to its time, not on when the record was read.  A growing record therefore
 has the same flights as the finished one.
@@ -203,7 +203,7 @@ class GrowingEvidence:
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # For a constant momentum, a fit treats rounding as gravity.
+            return 0.0  # A fit to a constant momentum would find false gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(states.index(start), len(states) - 1)
 

@@ -242,7 +242,7 @@ class InnerMotion:
         so_far: list[_Longest],
         free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time if half periods require it that were neither rotations nor caused by a push.
+        """Lengthen the waiting time to suit half periods that were neither rotations nor caused by a push.
 
         A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """

@@ -91,7 +91,7 @@ class Looks:
         return new_states, follows
 
     def _read_whole(self, names: Sequence[str]) -> History:
-        """Read all states of the files, with the errors of `new_states`."""
+        """Read all states of the files; the errors are those of `new_states`."""
         sources = open_files(names)
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)

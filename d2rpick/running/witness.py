@@ -1,4 +1,4 @@
-"""Find the force-free time of given parts, or of the model, at each state of a record from the states so far.
+"""Find the force-free time of the given parts, or of the model, at each state of a record from the states so far.
 
 In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
 is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
@@ -82,7 +82,7 @@ class _SampledFall(FreeFall):
 
 
 class GrowingWitness:
-    """Finds the force-free time of given parts, or of the whole model, at each state.
+    """Finds the force-free time of the given parts, or of the whole model, at each state.
 
     Attributes
     ----------
