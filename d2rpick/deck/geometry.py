@@ -317,7 +317,7 @@ class Placement:
         }
 
     def find_nodes(self, parts: Collection[int]) -> Reals:
-        """Return the positions of all nodes of the elements of some parts, shape (n, 3) [length]."""
+        """Return the positions of all element nodes of some parts, shape (n, 3) [length]."""
         numbers = [
             elements.nodes[np.isin(elements.part, list(parts))].ravel()
             for elements in self._inventory.elements
@@ -334,7 +334,7 @@ class Placement:
 def _compute_shares(
     elements: Elements, coordinates: Reals
 ) -> Iterable[tuple[int, _PartShare]]:
-    """Return the contributions of the elements of one kind to the position of each part."""
+    """Return what the elements of one kind contribute to the position of each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:

@@ -251,7 +251,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield the part id and node id of each node of the elements of the given parts, in deck order."""
+    """Yield the part id and node id of each element node of the given parts, in deck order."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])

@@ -52,7 +52,7 @@ _HEAVY: Final = 0.05
 def count_pieces(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
 ) -> int:
-    """Return the number of disconnected pieces of the mesh of the given parts; 0 if there are no elements.
+    """Return the number of disconnected mesh pieces of the given parts; 0 if there are no elements.
 
     ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
     """

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_sensors import Forces, Spans
 
     Contacts = Callable[[Collection[int]], Spans | None]
-# Number of lines of /BEGIN: the name of the run, the version, and two lines of units.
+# Number of lines in /BEGIN: the run name, the version, and two lines of units.
 _LINES_OF_BEGIN: Final = 4
 
 

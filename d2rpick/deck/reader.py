@@ -74,7 +74,7 @@ _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
 )
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled at its first use, to keep start-up fast.
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled on first use to keep start-up fast.
 # Pattern of keywords that resemble switching keywords.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"

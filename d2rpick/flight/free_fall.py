@@ -129,7 +129,7 @@ class Laws:
 
     @property
     def _carried(self) -> bool:
-        """Return True if parts on which no force is visible must be carried by a support."""
+        """Return True if the parts must be carried by a support whenever no force on them is visible."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -362,7 +362,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield the gravities close to an acceleration, from the ``known`` values or else from the usual values."""
+    """Yield values of gravity close to an acceleration, from the ``known`` values or else from the usual ones."""
     if known is not None:
         yield from (
             gravity

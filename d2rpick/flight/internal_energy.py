@@ -44,8 +44,8 @@ _KNOWN, _TURNED = 3 / 4, 4
 # Widening that makes the energy band of a flight's last quarter contain all energies of the flight [band widths].
 _RESERVE: Final = 0.5
 # Largest difference between the mean energies in the last two quarters of a flight, relative to the energy band [-].
-# A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
-# A steady drift changes the mean energies of the two quarters by the width of the energy band.
+# A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the band width.
+# A steady drift changes the mean energies of the two quarters by the band width.
 _DRIFT: Final = 0.35
 # A slow vibration swings through half of its energy range at least this often; a crash swings less often.
 _SWINGS: Final = 4

@@ -41,7 +41,7 @@ _STATES: Final = 200
 # A part whose relative velocity changes by no more than this fraction is not connected to the body [-].
 # The relative velocity of a connected part changes by more than this once the body has rotated by 0.01 degrees.
 _STEADY: Final = 1e-4
-# Largest deformation of the other parts at which a position error is exact, relative to the part's motion [-].
+# A position error is exact if the other parts deform by at most this fraction of the part's motion [-].
 # In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
 # In a public car model with position errors 3 to 4 times too small, this ratio was 1.1 to 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3

@@ -42,7 +42,7 @@ _SLOW: Final = 1e-2
 _MASS_ERROR: Final = 2.0
 # Largest deviation that is treated as no work, relative to the range of the internal energy [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in multiples of the relative rounding error of a number [-].
+# Error of a sum of energies minus the work of gravity, in relative rounding errors of one number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
 # _LITTLE: largest relative loss of kinetic energy that is ignored [-].

@@ -211,7 +211,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return text that asks whether early times of an argument in a ``record`` (n,) in ms or us were given in s.
+    """Return text that asks whether early times for a ``record`` (n,) in ms or us were given in s.
 
     The question is empty if that does not explain the value.
     """

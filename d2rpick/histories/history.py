@@ -467,7 +467,7 @@ class History:
         return float(energy.mean()) if energy.size else None
 
     def between(self, start: float, end: float) -> tuple[Samples, Samples]:
-        """Return times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
+        """Return the times [time] and energies [energy] of the states from ``start`` to ``end``, both included."""
         inside = find_window(self.time, start, end)
         return self.time[inside], self.energy[inside]
 

@@ -28,7 +28,7 @@ from d2rpick.models.box_model import (
 )
 
 # Contact stiffness of the floor and the curb per point [N/m]; it is lower than the stiffness of the box.
-# It does not limit the time step, and the box on its floor causes a penetration of 0.5 mm under its own weight.
+# This stiffness does not limit the time step; the weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
 # Sliding speed below which friction is proportional to the speed [m/s].
 # Typical sliding speeds are 100 times the value of SLIP.

@@ -366,7 +366,7 @@ class Outcome(NamedTuple):
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Return the tr values up to td [s]: dense until 1.5 times the end of the load, then just enough for the vibration.
+    """Return the tr values up to td [s], closely spaced until 1.5 times the end of the load and then more widely.
 
     Raises RangeError if td leaves no time for tr.
     """

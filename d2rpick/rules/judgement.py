@@ -307,7 +307,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
 def _judge_open_window(
     history: History, tr: float, settings: Settings
 ) -> Iterator[Fault]:
-    """Object to a tr without td unless it lies in the last flight of the history, or in a flight that contains it."""
+    """Object to a tr without td unless tr lies in the last flight of the history or in a flight around this tr."""
     last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:

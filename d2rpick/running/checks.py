@@ -1,4 +1,4 @@
-"""Check, before a first run is computed, that it will be able to switch its parts during the computation."""
+"""Check, before a first run is computed, that the run will be able to switch its parts."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _UNIT_SEPARATOR: Final = "\x1f"  # A control character that does not occur in tables.
-# Largest relative error of the fast number parser of pandas, which counts leading zeros as digits [-].
+# Largest relative error of pandas' fast number parser [-], which counts leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
 
