@@ -221,7 +221,7 @@ def _state_of(name: str) -> FileState:
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
-    """Fill ``room`` with the bytes of a file after an offset; return how many were read, fewer if the file ends."""
+    """Fill ``room`` with the bytes of a file after an offset; return the number of bytes, smaller if the file ends."""
     done = 0
     while done < len(room):
         # One call may return fewer bytes than requested, and never returns more than 2 GB.

@@ -131,7 +131,7 @@ def find_flaws(run: RadiossRun, switched: Collection[int]) -> tuple[Flaw, ...]:
 
 
 def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
-    """Return the flaw that the nodes of a group are unknown."""
+    """Return a flaw which reports that the nodes of a group are unknown."""
     message = f"the nodes of group {group} of {whose} are unknown, so nodes of rigid bodies in it were not checked"
     return Flaw(NOT_FOLLOWED, field, message)
 

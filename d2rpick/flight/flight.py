@@ -163,7 +163,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time; the search is repeated from its middle, to give the same flight as the list."""
+    """Return the flight around a time; the search is repeated from its middle to match the listed flight."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)

@@ -422,7 +422,7 @@ def _find_start(leg: Database) -> float:
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a restart segment, its start time and then its name, for any order of the arguments."""
+    """Return a key that sorts restart segments by start time and then by name, whatever the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 

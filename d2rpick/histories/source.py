@@ -362,7 +362,7 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return later restart segments in the folders of these files that the user did not name."""
+    """Return the later restart segments that lie next to these files and that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     legs: list[str] = []

@@ -60,7 +60,7 @@ class _TextCurve:
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
-    """Read a text of curves; None if the text has another format. The first selected curve determines the times."""
+    """Read a text that lists curves; None for any other text. The first selected curve determines the times."""
     curves = _CurveText(text)
     for read in (_read_curveplot, _read_t_his, _read_dynaform, _read_xy_pairs):
         if read(curves):
