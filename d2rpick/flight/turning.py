@@ -151,7 +151,7 @@ class _FlyingParts(NamedTuple):
         return [rows[column] for column in columns]
 
 
-class _Motion(NamedTuple):
+class _BodyMotion(NamedTuple):
     """Motion of the flying parts at times ``time`` (n,): the ``frame`` of the body, and ``places`` (n, parts, 3) in it.
 
     The places are relative to the centre of mass of all that flies [length].
@@ -244,7 +244,7 @@ def _follow_parts(
     frame_columns: Sequence[int],
     placement: Placement,
     displacements: Displacements | None,
-) -> _Motion | None:
+) -> _BodyMotion | None:
     """Follow the frame of the body and the flying parts in it; None if nothing determines the frame."""
     momenta = seen.momenta
     assert momenta.parts is not None
@@ -272,7 +272,7 @@ def _follow_parts(
         positions = _place_by_frames(flying.centres, travel, frame.axes)
     centre_of_mass = _weigh_by_mass(positions, masses)
     places = (positions - centre_of_mass[:, np.newaxis]) @ frame.axes
-    return _Motion(time, frame, places)
+    return _BodyMotion(time, frame, places)
 
 
 def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | None:
