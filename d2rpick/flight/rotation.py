@@ -40,7 +40,7 @@ _TRIED: Final = 2
 _MORE_RIGID: Final = 0.5
 # Largest motion of the other parts in a rotation that is ignored, relative to the motion of the moving part [-].
 _NOTABLE_WAY: Final = 0.1
-# Largest mass fraction of a single part at which the rotation of the body can be determined [-].
+# If one part has more than this fraction of the mass, the rotation of the body cannot be determined [-].
 _MOST_OF_BODY: Final = 0.95
 # Smallest mass fraction of the parts that are tried [-]; lighter parts hardly move the others.
 _HEAVY: Final = 0.05

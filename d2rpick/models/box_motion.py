@@ -33,7 +33,7 @@ STIFFNESS = 5e5
 # Sliding speed below which friction is proportional to the speed [m/s].
 # Typical sliding speeds are 100 times the value of SLIP.
 SLIP = 0.1
-# Largest depth below the floor at which a point touches the floor [m]; deeper points have left the sled.
+# A point up to this depth below the floor [m] touches the floor; deeper points have left the sled.
 DEEPEST = 0.1
 # Thickness of the curb at the end of the sled [m].
 CURB_THICKNESS = 0.05

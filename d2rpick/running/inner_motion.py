@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # Smallest velocity change that counts as an oscillation, relative to the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: fraction of the change that is ignored at each end when a half period is measured [-].
-# _INNER_TIME: fraction of its half period in which a harmonic motion makes the middle part of the change [-].
+# _INNER: fraction of the velocity change ignored at each end when a half period is measured [-].
+# _INNER_TIME: fraction of the half period in which a harmonic motion makes the middle part of that change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
 # Largest mean force in an oscillation treated as body rotation, relative to the largest mean force so far [-].
 _ROTATION: Final = 0.05

@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name denotes internal energy, or else the only column besides the time."""
+        """The column whose name denotes internal energy, otherwise the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )

@@ -350,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the recent example block that the last block of the file resembles, or else the last block itself."""
+        """Return the recent example block that the last block of the file resembles; otherwise, this last block."""
         alike = (
             example
             for example, stride in recent

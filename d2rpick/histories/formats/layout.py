@@ -1,4 +1,4 @@
-"""Find the layout of a table in a text: separator, decimal sign, first row, names and units."""
+"""Find the layout of a table in a text file: separator, decimal sign, first row, names and units."""
 
 from __future__ import annotations
 

@@ -246,7 +246,7 @@ class TimeHistory(Database):
         return self.time
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a variable of some parts, shape (n, len(ids)).
+        """Return a variable of the given parts, shape (n, len(ids)).
 
         Raises
         ------
