@@ -238,7 +238,7 @@ def _sum_energies(history: History) -> Samples:
 
 
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
-    """Return the band of some values, widened at both ends by a fraction of its width."""
+    """Return the band of the given values, widened at both ends by a fraction of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 

@@ -299,7 +299,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question that suggests a similar file in the folder, or a hint if the name is a time; else empty."""
+    """Return a question that suggests a similar file in the folder, or a hint if the name is a time, or ""."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"

@@ -46,7 +46,7 @@ SAME_CONTACT = 2e-3
 
 # Safety factor on the stable time step 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# Largest excess over a whole number of time steps that is rounded down, as a fraction of a time step [-].
+# Times that exceed a whole number of time steps by at most this fraction of a time step are rounded down [-].
 _SAME = 1e-6
 
 

@@ -1,4 +1,4 @@
-"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown or a bare value."""
 
 from __future__ import annotations
 

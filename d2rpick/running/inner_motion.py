@@ -160,7 +160,7 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the internal motion so far, as the waiting time ``wait`` that it requires, or None.
+    """The longest half period of the internal motion so far, and the waiting time ``wait`` that it requires, if any.
 
     ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
     the longest swing, even if a force pushed the swing [time].

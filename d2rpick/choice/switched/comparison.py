@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest relative difference between the energies of two runs of the same model before the switch [-].
+# Two runs are of the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
 # Fraction of the record in which runs are assumed to be deformable if the time of the switch is unknown [-].
 _EARLY: Final = 0.1

@@ -520,7 +520,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error [-] in a range of tr, and its tr [time]; infinite if there is no tr."""
+    """Return the smallest frozen-deformation error [-] in a range of tr, and its tr [time]; infinite without any tr."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:

@@ -296,7 +296,7 @@ class Table(Database):
         )
 
     def find(self, wanted: str) -> str:
-        """Return the channel name of a column given by name or 1-based number; else a FormatError lists the columns."""
+        """Return the channel name of a column given by name or 1-based number; raise FormatError if there is none."""
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = find_column(self.source, self._layout, wanted)

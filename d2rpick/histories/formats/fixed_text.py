@@ -325,7 +325,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` if their layout is a recent one; else None."""
+        """Return example, stride and count of the blocks at ``position`` if their layout is recent, otherwise None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:

@@ -69,7 +69,7 @@ class Layout(NamedTuple):
         return self.columns if self.sure is None else self.sure
 
     def number(self, cell: str) -> float | None:
-        """Return the number in a cell, or None."""
+        """Return the number in a cell; None if the cell does not contain a number."""
         return parse_cell(cell, self.decimal, self.thousands)
 
     def plain(self, cell: str) -> str:
