@@ -56,6 +56,8 @@ class RepeatedQuestion(NamedTuple):
         All options and files by which ``card`` judges in the same way.
     files : tuple of str
         Files of the history.
+    card : tuple of str
+        Options of the card, which only a command that prints a card accepts.
     """
 
     times: tuple[str, ...] = ()
@@ -63,6 +65,7 @@ class RepeatedQuestion(NamedTuple):
     options: tuple[str, ...] = ()
     judging: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    card: tuple[str, ...] = ()
 
 
 class DisplayOptions(NamedTuple):

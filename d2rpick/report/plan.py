@@ -24,6 +24,8 @@ from d2rpick.report.fields import (
 from d2rpick.report.next_step import (
     name_step_after_refusal,
     name_step_to_card,
+    name_step_to_deck,
+    needs_deck,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -313,6 +315,8 @@ def list_next_steps(
     step = f"{cards}. Then add them to the deck, and run the deck from t = 0"
     if cards.startswith("choose"):
         step = cards
+    elif needs_deck(plan.history, plan.settings):
+        step = name_step_to_deck(question)
     if written_deck:
         step = f"run the deck in {written_deck.folder} from t = 0"
         if not written_deck.passed:
