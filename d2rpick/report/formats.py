@@ -35,10 +35,14 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class WrittenDeck(NamedTuple):
-    """The folder of a deck that was written with the cards of a plan, and whether the deck ``passed`` its check."""
+    """The folder of a deck that was written with the cards of a plan, and the result of its check.
+
+    ``passed`` is True if the check found no error, ``warned`` if it found an error or a warning.
+    """
 
     folder: str
     passed: bool
+    warned: bool
 
 
 class RepeatedQuestion(NamedTuple):

@@ -321,6 +321,8 @@ def list_next_steps(
         step = f"run the deck in {written_deck.folder} from t = 0"
         if not written_deck.passed:
             step = f"correct what the check of the written deck found, then {step}"
+        elif written_deck.warned:
+            step = f"{step}, after reading the warnings of its check below"
     again = (
         ". Then plan the remaining flights from that run (--done)" if waiting else ""
     )
