@@ -396,11 +396,10 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
     """Return the rigid time given up for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
-    pairs = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
-        (f"flight {number}", describe_given_up_time(pair.longer, pair.recommended))
-        for number, pair in pairs
-        if pair.longer and pair.recommended
+        (f"flight {row.number}", describe_given_up_time(row.answer))
+        for row in supported
+        if row.answer and row.answer.longer and row.answer.recommended
     ]
     assumed = [
         row
