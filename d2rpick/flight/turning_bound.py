@@ -1,4 +1,4 @@
-"""Bound the speed that rotation may add at the point of contact, if no file shows how the body rotates.
+"""Bound the speed that rotation may add at the point of contact if no file shows how the body rotates.
 
 The kinetic energy of a body less that of its centre of mass is the energy of its vibration and of its rotation, and
 the latter is the same in all states of a flight.  Its least value therefore bounds the rotation.

@@ -1,4 +1,4 @@
-"""Name the command that follows an answer, with the options and the files of its question, so that it can be typed."""
+"""Name the command that follows an answer, with the options and the files of its question, ready to be copied."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
-# Ids in a command if the user has to name the parts or the nodes, because no file contains them.
+# Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
 _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
 # Main deck in a command if the user has to name it, and the folder for the copy of it.
@@ -31,7 +31,7 @@ _NEEDS_DECK: Final = (
 def write_command(
     question: RepeatedQuestion, name: str, *words: str, new_parts: Sequence[str] = ()
 ) -> str:
-    """Return another command about the same run, with the given parts unless ``new_parts`` replace them."""
+    """Return another command about the same run, with the given parts or, if there are any, the ``new_parts``."""
     parts = ("--part", ",".join(new_parts)) if new_parts else question.parts
     files = make_positional(question.files)
     return quote_shell_line(
@@ -70,7 +70,7 @@ def name_step_to_card(
     *,
     flying: bool,
 ) -> str:
-    """Return the step that prints the card of windows, with ``command`` (``suggest`` or ``plan``) or with ``card``.
+    """Return the step that prints the card for windows by ``command`` (``suggest`` or ``plan``) or by ``card``.
 
     If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
     """
@@ -118,7 +118,7 @@ def name_step_after_refusal(
     question: RepeatedQuestion,
     otherwise: str,
 ) -> str:
-    """Return the step after a pair that cannot be used: to a better pair, to more parts, or ``otherwise``."""
+    """Return the step after a pair that cannot be used: a better pair, more parts, or ``otherwise``."""
     if better is not None:
         line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
         return f"judge the better pair with {line}"

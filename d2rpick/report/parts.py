@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Column names of the table of sets, and of the two tables into which the columns for parts are divided.
+# Column names of the table of sets, and of the two tables of parts.
 SETS = (
     "set",
     "parts",
@@ -92,7 +92,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# The fields on a part's behaviour in flight describe the longest flight.
+# The fields for a part's behaviour in flight describe the longest flight.
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -277,7 +277,7 @@ def as_markdown(answer: Parts, display: DisplayOptions) -> str:
 
 
 def as_csv(answer: Parts, _: DisplayOptions) -> str:
-    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
+    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output; lists use ``;``."""
     return write_csv(PART.keys, map(PART.plain, answer.rows), ";")
 
 
@@ -342,7 +342,7 @@ def build_set_table(
 
 
 def _format_position_error(part_set: PartSet) -> str:
-    """Return the position error of a set as text, with the assumption behind it."""
+    """Return the position error of a set as text, with the underlying assumption."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
@@ -403,7 +403,7 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
-    """Return the next command: to the plan with the recommended set, or to all td if its pair cannot be used."""
+    """Return the next command: ``plan`` with the recommended set, or ``explore`` if the pair of the set is unusable."""
     best = answer.recommended
     if best is None:
         parts: Sequence[str] = ()
@@ -419,7 +419,7 @@ def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str,
 
 
 def _explain_no_part(answer: Parts) -> str:
-    """Explain why no set was compared: for some parts it is unknown whether they can be switched, or none can be."""
+    """Explain why no set was compared: no part can be switched, or this is unknown for some parts."""
     unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
     if not unknown_rows:
         return "no part can be switched"

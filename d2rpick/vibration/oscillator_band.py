@@ -1,4 +1,4 @@
-"""Compute the error band of an identified oscillator's residual, due to noise, damping and hidden modes."""
+"""Compute the error band of an identified oscillator's residual due to noise, damping and hidden modes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Largest effect on R^2 of a hidden mode that raises only the upper bound of the residual, not its value [-].
+# A hidden mode with at most this effect on R^2 raises the upper bound of the residual, but not the residual [-].
 _HARMLESS: Final = 0.25**2
-# Effect on R^2 of a hidden fraction of harmonics of a nonlinear spring, as a factor on this fraction [-].
+# Effect on R^2 of the harmonics of a nonlinear spring, per hidden fraction of the energy [-].
 _HARMONIC_COUNTS: Final = 8.0
 
 
@@ -49,13 +49,13 @@ def residual_band(
     off = scatter + share * squared + bent
     opposed = _count_opposed(fit, tr, td)
     decayed = _count_decayed(fit, tr, td)
-    # The misfit may hide a lasting mode or an early decaying mode; the one with the larger effect is assumed.
+    # The misfit may hide a lasting mode or a mode that decays early; the larger effect of the two is assumed.
     hidden = np.maximum(fit.hidden_share * opposed, decayed)
     stated_now, low, high = measures.band_about(
         squared, off, hidden, fit.hidden_share * squared
     )
     # A hidden mode is assumed to exist with a probability of 1/2.
-    # Because of this probability, the stated residual includes half of the effect beyond solver errors.
+    # The stated residual therefore includes half of the effect in excess of solver errors.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
@@ -71,7 +71,7 @@ def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
 
 
 def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a mode that the fit leaves out at tr, and that has decayed at td [-].
+    """Return R^2 of a mode that the fit omits at tr and that has decayed by td [-].
 
     The deformation at tr holds its energy, which is compared with the vibration that is left at td.
     """
