@@ -44,7 +44,7 @@ def needs_deck(history: History, settings: Settings) -> bool:
     from d2rpick.deck.printing import SOLVERS, find_solver
 
     switches_parts = SOLVERS[find_solver(history.format)].switches == "part"
-    return switches_parts and settings.bodies is None and len(history.parts or ()) > 1
+    return switches_parts and not settings.bodies and len(history.parts or ()) > 1
 
 
 def name_step_to_deck(question: RepeatedQuestion) -> str:
