@@ -135,7 +135,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    run_folder: str | None = None  # Folder of the run whose files `history` names.
+    run_folder: str | None = None  # Folder of the run with the files in `history`.
     # True if `deck` was found in the folder of the run.
     deck_in_folder: bool = False
     given: Collection[str] | None = None

@@ -430,7 +430,7 @@ def extract_columns(
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the energy balance of the whole model at the times of the energy, keyed by name.
+    """Return the energy terms of the whole model, keyed by name; empty unless they have the same times as the energy.
 
     The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """

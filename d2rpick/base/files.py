@@ -35,7 +35,7 @@ _BOUNDS: Final = {
     ),  # Largest length of a line [bytes]; it is enough for about 50,000 columns.
     "DEPTH": (100.0, "groups"),
 }
-# Smallest unpacked size at which the ratio is checked [bytes]; constant columns reach a ratio of 1000.
+# The ratio of unpacked to packed size is checked above this unpacked size [bytes]; constant columns reach 1000.
 _ALLOWED: Final = 1 << 24
 _TRIES: Final = 5  # Number of attempts to read a file that keeps changing.
 _TICK: Final = 50_000_000  # Resolution of the file times on most file systems [ns].
@@ -49,7 +49,7 @@ _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """Bytes that can be searched backwards for a marker."""
+    """A bytes-like object that can be searched backwards for a marker."""
 
     def __len__(self) -> int: ...
 
@@ -221,7 +221,7 @@ def _state_of(name: str) -> FileState:
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
-    """Fill ``room`` with the bytes of a file after an offset; return the number of bytes, smaller if the file ends."""
+    """Fill ``room`` with the bytes of a file after an offset; return the number of bytes read (fewer at its end)."""
     done = 0
     while done < len(room):
         # One call may return fewer bytes than requested, and never returns more than 2 GB.

@@ -86,7 +86,7 @@ class Farm:
 
 
 def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
-    """Compute one call; an error becomes part of the result."""
+    """Execute one call; an exception is returned in the result instead of being raised."""
     try:
         return Finished(number, function(item), None)
     except Exception as error:  # noqa: BLE001  the caller handles any error
@@ -183,7 +183,7 @@ class Cores(Farm):
     def _answer_alone(
         self, number: int, function: Callable[[Item], Result], item: Item
     ) -> Finished:
-        """Compute a call in a pool of its own, so that a crash of its process affects no other call."""
+        """Execute a call in a pool of its own, so that a crash of its process affects no other call."""
         pool, future = self._begin_pool(1, function, item)
         answer = _make_answer(number, future)
         pool.shutdown(wait=False)

@@ -122,7 +122,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair whose grade is not "poor", at this td or at the nearest suitable energy peak; or else None."""
+        """A better pair with a grade other than "poor", at this td or the nearest suitable peak; None without one."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
@@ -493,7 +493,7 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair at the nearest energy peak in the flight that has one; None if no peak has one.
+    """Return the pair recommended at the energy peak closest to td that has such a pair; None if no peak has one.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
@@ -526,7 +526,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair whose grade is not "poor": the one recommended at this td, or else a better pair at another td."""
+    """Return a pair whose grade is not "poor": the recommended one at this td, otherwise a better one at another td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended

@@ -41,7 +41,7 @@ MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
 _FLOOR: Final = 1e-15
 # Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01
-# Smallest reference energy at which the energy ratio is used, as a fraction of the peak of the reference energy [-].
+# The energy ratio is used only if the reference energy is at least this fraction of its peak [-].
 # If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
@@ -266,7 +266,7 @@ def _find_worst_part(balance: Balance) -> dict[str, Any]:
 def _find_ratio_range(balance: Balance) -> dict[str, Any]:
     """Return the range of the energy ratio over the times with a large enough reference energy, as fields of `Health`.
 
-    The ratio is that of the solver, or else computed from the terms.
+    The ratio is that of the solver or, if the files lack it, is computed from the terms.
     """
     ratio = balance.ratio
     total = _compute_total(balance)

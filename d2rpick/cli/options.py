@@ -1,4 +1,4 @@
-"""Make the options of the commands from the tables of requests, and print the settings and the command line."""
+"""Make the command-line options from the argument tables of the API, and print the settings and the command line."""
 
 from __future__ import annotations
 

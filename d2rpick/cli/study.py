@@ -230,7 +230,7 @@ def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) 
 def _choose_farm(
     jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool
 ) -> Farm:
-    """Choose where to compute a number of calls; a single call needs no separate process."""
+    """Choose where the given number of calls is executed; a single call needs no separate process."""
     from d2rpick.base import workers
 
     if scheduler and calls:

@@ -117,7 +117,7 @@ def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
 
 
 def _make_reading_request(ctx: click.Context) -> Request:
-    """Return the reading options on the command line as a request."""
+    """Make a request from the command-line options that control how the history is read."""
     from d2rpick.api.request import Request
 
     return Request(

@@ -55,7 +55,7 @@ def read_inventory(path: str) -> Inventory:
 
 
 def find_time_unit(path: str) -> str:
-    """Return the time unit that a Radioss run gives for deck and computation; empty if it gives none or two.
+    """Return the time unit that a Radioss deck gives for itself and the computation; empty unless both have the same.
 
     Decks of LS-DYNA name no units.
 

@@ -317,7 +317,7 @@ class Placement:
         }
 
     def find_nodes(self, parts: Collection[int]) -> Reals:
-        """Return the positions of all element nodes of some parts, shape (n, 3) [length]."""
+        """Return the positions of all element nodes of the given parts, shape (n, 3) [length]."""
         numbers = [
             elements.nodes[np.isin(elements.part, list(parts))].ravel()
             for elements in self._inventory.elements

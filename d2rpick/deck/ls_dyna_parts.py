@@ -553,7 +553,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id, or else the one with this number in order of definition.
+        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # A function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
+    # A function that returns the time spans in which the force of a contact or wall exceeds a value; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 
 

@@ -40,7 +40,7 @@ _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
 _ID_ENDS: Final = 7
 _HIGHEST: Final = 10**17  # Ids must be smaller than this number to avoid an overflow.
 NO_NODE: Final = -1  # Index that stands for a missing node.
-_DENSE: Final = 50_000_000  # Largest id at which a table of all ids fits into memory.
+_DENSE: Final = 50_000_000  # Largest id for which an id table fits into memory.
 NOTHING: Final = -1  # Placeholder for a field that contains no id.
 # Up to this number of lines, the fields of all lines are parsed together; a deck may have a card for each element.
 _FEW: Final = 1000
@@ -125,7 +125,7 @@ class Lines:
         }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
-        """Return the texts of some fields of a line."""
+        """Return the text in each of the given fields of a line."""
         if "," in text:
             cells = text.split(",")
             return [

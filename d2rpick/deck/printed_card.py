@@ -40,7 +40,7 @@ class Printing(NamedTuple):
     Attributes
     ----------
     solver : str, optional
-        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, or else for LS-DYNA.
+        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, by default LS-DYNA.
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # Largest number of digits of an id.
+_DIGITS = 10  # Maximum number of digits in an id.
 
 # Element kinds whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {

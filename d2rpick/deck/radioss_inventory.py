@@ -82,7 +82,7 @@ _ELASTIC: Final = {
 }
 _VOID: Final = {"VOID", "LAW0", "LAW00"}
 _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
-# Types of shell properties with the thickness in the same columns.
+# Shell property types that all have the thickness in the same columns.
 _PLAIN_SHELLS: Final = {
     "SHELL",
     "TYPE1",

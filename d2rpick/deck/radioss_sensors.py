@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Row
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # A function that returns the time spans in which the force of an interface or rigid wall acts, or None.
+    # A function that returns the time spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
 # First input version in which a time sensor can end (Tstop).

@@ -67,7 +67,7 @@ class Unswitchable(NamedTuple):
 def find_unswitchable_in_ls_dyna(
     deck: Deck, parts: DeckParts
 ) -> dict[int, Unswitchable]:
-    """Return the parts of an LS-DYNA deck that must not be switched, keyed by part id, from sections and materials."""
+    """Return the parts of an LS-DYNA deck whose section or material forbids switching, keyed by part id."""
     sections = read_sections(deck)
     laws = {
         name_material(card, card.data[0], MATERIAL["MID"]): card.name

@@ -20,7 +20,7 @@ Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
 # With a larger deviation, the orientation of the body cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Smallest mass fraction at which the connected parts alone define the frame of a body [-].
+# If the connected parts have at least this fraction of the mass, only they define the frame of a body [-].
 _MOST: Final = 0.5
 # Points are treated as lying on a line if one moment of inertia is at most this fraction of the others [-].
 _ALONG_LINE: Final = 1e-9
@@ -144,7 +144,7 @@ def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 
 def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return how far points deviate from their shape, relative to the size of the shape along its longest axis [-].
+    """Return the rms deviation of points from a rigid shape, relative to its smallest radius of gyration [-].
 
     Infinite if the points lie on a line.
     """

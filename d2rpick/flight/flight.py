@@ -142,7 +142,7 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td. The search begins at a fixed start time within this flight, or else at td."""
+        """Return the flight around td, searched from a fixed time within it if possible, otherwise from td."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
@@ -153,7 +153,7 @@ class Witness(NamedTuple):
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``. The search begins at a time shared by many td, or else at td itself."""
+    """Return the flight around ``td``, searched from a time shared by many td if possible, otherwise from td."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -163,7 +163,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time; the search is repeated from its middle to match the listed flight."""
+    """Return the flight around a time; search again from its middle to obtain the same flight as in the list."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
@@ -334,7 +334,7 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
 def _explain_contradicted_momentum(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> str | None:
-    """Return how the energies contradict a flight that the momentum alone shows at ``td`` [time], or None."""
+    """Return how the energies contradict a flight that only the momentum shows at ``td`` [time]; None if they agree."""
     from d2rpick.flight.momentum import find_flight_around
 
     flights = [
@@ -356,7 +356,7 @@ def _explain_contradicted_momentum(
 def _find_flight_by_momentum(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td`` from the momentum of the parts, or else of the whole model."""
+    """Return the flight around ``td`` from the momentum of the parts or, if there is none, of the whole model."""
     from d2rpick.flight.momentum import find_flight_around
 
     for candidate in momenta:
@@ -417,7 +417,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces; if the energy rises, return the part with a steady level.
+    """Return the flight around td from contact forces, limited to times with one energy level if the energy rises.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -442,7 +442,7 @@ def _limit_to_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Return the part of a flight in which the internal energy stays on one level; None if td comes before this part.
+    """Limit a flight to the time span in which the internal energy stays on one level; None if td is before that span.
 
     ``momenta`` are those that show the flight.
     """
@@ -499,7 +499,7 @@ def _limit_to_level(
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """For a td that is not in a flight, return the last flight before it, or else the first flight after it."""
+    """For a td outside of flights, return the last flight before it if there is one, otherwise the next one."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (

@@ -34,24 +34,24 @@ if TYPE_CHECKING:
 # _GRAVITY: gravity in m, inches and feet per second squared; other units change it by a power of 10.
 # _ALIKE: largest relative deviation of an acceleration treated as gravity [-]; 1 in 200 loads lies within it.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
-# Usual values of gravity in decks in m, inches and feet per second squared, apart from a power of 10.
+# Usual values of gravity in decks in m, inches and feet per second squared, up to a power of 10.
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 # Ratio of the rounding error in a fitted momentum change to the rounding error in the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
 # _ROUGHLY: relative tolerance for the magnitude of gravity while a load fades [-].
 # _ALONG_AXIS: smallest direction cosine between gravity and an axis while a load fades [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# _DAMPED: largest momentum loss in a window that is always attributed to damping, relative to the momentum [-].
+# _DAMPED: a loss of at most this fraction of the momentum in a window is always attributed to damping [-].
 # _LEFT: a loss above _DAMPED is attributed to damping if this fraction of the largest momentum remains [-].
 _DAMPED, _LEFT = 0.2, 0.05
-# Largest momentum loss between successive states that is attributed to damping, relative to the momentum [-].
+# A loss of at most this fraction of the momentum between successive states is attributed to damping [-].
 _SHOWN = 0.1
 # Largest deviation of the momentum in a window without loads, relative to its largest value and to its range [-].
 # A fading load that causes this deviation may change the momentum by twice as much over the window.
 # If only some of the moving parts are tested, TOLERANCE replaces this limit, because other parts act on them.
 _ENOUGH = 3e-3
 # The next three constants are used to find gravity perpendicular to a load of constant direction.
-# _REACH_OF_NOISE: largest deviation of the momentum perpendicular to the load [rounding errors].
+# _REACH_OF_NOISE: largest deviation of the momentum component perpendicular to the load due to noise [rounding errors].
 # _SEEN: smallest component perpendicular to the load of an axis along which gravity may act [-].
 # _CLEARLY: smallest ratio of the deviation along the load to the deviation perpendicular to it [-].
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
@@ -64,7 +64,7 @@ _STRAIGHT = 0.01
 _UNSEEN = 2.0
 # Relative error of the work of gravity computed from the states [-].
 _OF_WORK = 2e-3
-# Smallest relative excess of a mass written by the solver over the lower bound from momenta and energies [-].
+# A mass that exceeds the lower bound from momenta and energies by this fraction was written by the solver [-].
 _CLEARLY_HEAVIER = 1e-6
 
 
@@ -122,7 +122,7 @@ class Laws:
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law even if the tolerance is made stricter."""
+        """Return the states around ``td`` that obey a law of motion even with a tighter tolerance."""
         return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
@@ -281,7 +281,7 @@ class Laws:
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
-        """Return True if a force may be gravity acting on a mass above the lower bound from the kinetic energy.
+        """Return True if a force may be the weight of a mass above the lower bound that the kinetic energy implies.
 
         At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
         energy swings.
@@ -362,7 +362,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield values of gravity close to an acceleration, from the ``known`` values or else from the usual ones."""
+    """Yield values of gravity close to an acceleration, from the ``known`` values or, by default, the usual ones."""
     if known is not None:
         yield from (
             gravity

@@ -123,7 +123,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time after ``start`` at which the energy quickly leaves its former range [time], or None.
+    """Return the first time [time] after ``start`` at which the energy quickly leaves its former range; None if never.
 
     The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
     width: no vibration goes so far beyond its range of so long a time.
@@ -151,7 +151,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the end of the load [time], the last time before td at which the energy enters its band, or None.
+    """Return the end of the load [time], the last time before td at which the energy enters its band; None if unknown.
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
@@ -179,7 +179,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, states: slice) -> float | None:
-    """Among some states, return the time of the last one at which the energy is far from its usual values, or None."""
+    """Return the last time in the given states at which the energy is far from its usual values; None if never."""
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
@@ -189,7 +189,7 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
 
 
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
-    """Among some states, return the time of the last one to which the energy changes much faster than usual, or None.
+    """Return the time in the given states at which the last unusually fast energy change ends; None if there is none.
 
     Usual are the rates from the time ``latest`` on.
     """
@@ -209,14 +209,14 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the energy leaves the band of these states [time], or None."""
+    """Return the first time [time] after the given states at which the energy exceeds their band; None if never."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None
 
 
 def _find_change_of_level(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the mean energy leaves the band of their means, or None."""
+    """Return the first time after the given states at which the mean energy leaves their band; None if never."""
     count = states.stop - states.start
     width = round(_LEVEL * count)
     if width < 1:
@@ -238,7 +238,7 @@ def _sum_energies(history: History) -> Samples:
 
 
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
-    """Return the band of some values, widened at both ends by a fraction of its width."""
+    """Return the band of the given values, widened at both ends by a fraction of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 

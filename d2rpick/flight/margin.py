@@ -54,7 +54,7 @@ def compute_margin(
     place: float | None = None,
     turning: float | None = None,
 ) -> Margin:
-    """Return the margin before the contact that ends a flight: the user's margin if there is one, or else an estimate.
+    """Return the margin before the contact that ends a flight: the user's margin or, by default, an estimate.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 

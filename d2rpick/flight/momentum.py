@@ -49,7 +49,7 @@ _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 _ROUNDED: Final = 1e-9
 # Largest final speed of parts at rest or held by a support, relative to their largest momentum [-].
 _HELD = 0.01
-# Largest relative difference between summed part momenta and the momentum of the model if no part is missing [-].
+# No part is missing if the part momenta add up to the momentum of the model within this relative error [-].
 _ALL_OF_IT: Final = 1e-2
 # _BY_ITSELF: shortest separate flight of a body that is considered, as a fraction of the record [-].
 # _OF_ITS_OWN: smallest relative velocity difference between a body that flies separately and the other parts [-].

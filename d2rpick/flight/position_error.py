@@ -494,7 +494,7 @@ def _find_drift_of_body(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Return the displacement of a body whose parts have energy; None if only a single part flies."""
+    """Return the displacement of a body, zero for a single part in flight; None if the energy of a part is unknown."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

@@ -38,9 +38,9 @@ _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(
 _TRIED: Final = 2
 # Omitting the next moving part must reduce the unexplained displacement to at most this fraction [-].
 _MORE_RIGID: Final = 0.5
-# Largest motion of the other parts in a rotation that is ignored, relative to the motion of the moving part [-].
+# A rotation that moves the other parts by at most this fraction of the motion of the moving part is ignored [-].
 _NOTABLE_WAY: Final = 0.1
-# Largest mass fraction of a single part at which the rotation of the body can be determined [-].
+# If one part has more than this fraction of the mass, the rotation of the body cannot be determined [-].
 _MOST_OF_BODY: Final = 0.95
 # Smallest mass fraction of the parts that are tried [-]; lighter parts hardly move the others.
 _HEAVY: Final = 0.05

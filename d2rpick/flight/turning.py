@@ -309,7 +309,7 @@ def _integrate_velocities(
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
-    """Return the positions (n, parts, 3) of parts in a record within the run, apart from a common displacement.
+    """Return the positions of parts during a section of the run, up to a common displacement, shape (n, parts, 3).
 
     Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
     the frame of the body: a part that vibrates on its mounts does so about its place.

@@ -125,7 +125,7 @@ def find_lasting_window(
     enough: float = 0.0,
     rings: bool = False,
 ) -> tuple[int, int] | None:
-    """Find the states around ``td`` that obey the law and still obey it if the tolerance is made stricter.
+    """Find the states around ``td`` that obey the law, and still obey it with a tighter tolerance.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 # Relative error of the work of gravity, caused by sampling and by the solver's sums [-].
 # Contacts are found because they change the energies by more than this fraction of the work of gravity.
 _OWN_ERROR: Final = 1e-3
-# Relative deviation of the work of gravity from a parabola that is attributed to damping [-].
+# If the work of gravity deviates from a parabola by at most this fraction, damping may be the reason [-].
 _BENT: Final = 1e-2
 # Smallest squared speed of states that are used to compute the mass, relative to the largest [-].
 _SLOW: Final = 1e-2
@@ -46,7 +46,7 @@ _OF_INTERNAL: Final = 0.1
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
 # _LITTLE: largest relative loss of kinetic energy that is ignored [-].
-# _MUCH: smallest relative loss of kinetic energy that is attributed to friction instead of damping [-].
+# _MUCH: a relative loss of kinetic energy of at least this is attributed to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
 # Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
@@ -122,7 +122,7 @@ class _ExternalWork(Law):
 def _measure_unexplained_work(
     balance: Balance, external_work: Samples, inside: slice
 ) -> float:
-    """Return the largest external work in some states that neither gravity nor damping explains [energy]."""
+    """Return the largest external work in the given states that neither gravity nor damping explains [energy]."""
     time = balance.time[inside]
     work = external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])

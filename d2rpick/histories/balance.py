@@ -61,7 +61,7 @@ _NONE: Final = 1e-6
 _FLOOR: Final = 1e-15
 # Largest deviation of the summed spring energies of the parts, relative to the peak [-]; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
-# Smallest fitted factor at which a part is included in the sum [-]; the ideal factors are 0 and 1.
+# A part is included in the sum if its fitted factor is larger than this [-]; the ideal factors are 0 and 1.
 _HALF: Final = 0.5
 
 
@@ -186,7 +186,7 @@ class _Columns:
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model as written, or else the smallest mass that fits these momenta (n, 1, 3)."""
+        """Return the mass of the model in the file; without it, the smallest mass that fits these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:

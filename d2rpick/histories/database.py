@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest fraction of the states at which time values may step back [-]; columns other than the time exceed it.
+# Time values may decrease at up to this fraction of the states [-]; columns other than the time exceed it.
 _MOST_BACK: Final = 0.1
 # Significant digits, keyed by bytes per number: single precision has 7, and 17 digits preserve every double.
 DIGITS: Final = {4: 7, 8: 17}
@@ -50,8 +50,8 @@ _FEWEST = 0.5
 # Largest difference between the end times of databases of one run [output intervals]; a killed run lacks states.
 _ENDS_APART = 2.0
 # Tolerances by which the internal energy of the parts may exceed the energy of the model.
-# _MORE: excess relative to the largest energy of the model [-]; solver files show less than 0.1 %.
-# _ROUND_OFF: excess relative to the largest kinetic energy [-].
+# _MORE: tolerance relative to the largest energy of the model [-]; in solver files, less than 0.001 is needed.
+# _ROUND_OFF: additional tolerance relative to the largest kinetic energy of the model [-].
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
@@ -134,7 +134,7 @@ class Database:
         return self.branch("glstat").channel(name)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
+        """Return a quantity (``internal_energy``, ``x_momentum``, ...) of the given parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
     @cached_property

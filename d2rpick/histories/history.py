@@ -172,7 +172,7 @@ class NodeMotion(NamedTuple):
 
 @remember
 def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
-    """Return the sum of the momenta of some parts, read-only, shape (n, 3)."""
+    """Return the sum of the momenta of the given parts, read-only, shape (n, 3)."""
     return freeze(momenta.values[:, list(members)].sum(axis=1))
 
 
@@ -247,7 +247,7 @@ class Given:
     written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  subclasses use the argument
-        """Return internal energies of some parts, ``values`` (n, parts) [energy]; None if the files lack them."""
+        """Return internal energies of the given parts, ``values`` (n, parts) [energy]; None if the files lack them."""
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
@@ -255,7 +255,7 @@ class Given:
         return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if it is missing."""
+        """Return the kinetic energy of given parts or of the model, ``values`` (n,) [energy]; None if it is missing."""
         balance = self.balance
         if parts is not None or balance is None or balance.kinetic is None:
             return None

@@ -34,7 +34,7 @@ _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 # Date on which OpenRadioss corrected the energy of switched elements
 _FIXED: Final = (2026, 1, 13)
-# Commits from the weeks before this date; an engine built from them may show the year of the correction.
+# Commits from the weeks before OpenRadioss was corrected; an engine built from them may show the year 2026.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "

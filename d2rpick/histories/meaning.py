@@ -197,7 +197,7 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of names that denote exactly an internal energy, or else of all names that mention one.
+    """Return the indices of names that denote exactly an internal energy, otherwise of all names that mention one.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """

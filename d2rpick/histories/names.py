@@ -178,7 +178,7 @@ def is_unit(cell: str) -> bool:
 
 
 def match_names(wanted: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that match ``wanted``: exactly, else ignoring case, else ignoring the unit."""
+    """Return the indices of the names that match ``wanted`` exactly or, if none do, without case or unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
@@ -252,7 +252,7 @@ def clean_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Return the number that follows the name of a family's first file in another file name, or None.
+    """Return the number that a file name appends to the name of the first file in its family; None if there is none.
 
     Examples
     --------

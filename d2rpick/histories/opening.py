@@ -449,17 +449,17 @@ def _list_columns_and_parts(leg: Database) -> set[str | int]:
 
 
 def _list_model_times(leg: Database) -> Samples:
-    """Return the times of the whole model, shape (n,); empty if the restart segment has no columns."""
+    """Return the times of the states with model quantities, shape (n,); empty if the restart segment has none."""
     return leg.time if leg.channels else np.empty(0)
 
 
 def _list_part_times(leg: Database) -> Samples:
-    """Return the times of the parts, shape (n,); empty if there are no parts."""
+    """Return the times of the states with part quantities, shape (n,); empty if the restart segment has none."""
     return leg.part_time if leg.parts else np.empty(0)
 
 
 def _read_model_energies(leg: Database, states: Indices) -> Samples:
-    """Return the internal energy of the model at given states, shape (states,), or an empty array (states, 0)."""
+    """Return the internal energy of the model at given states, shape (states,), or (states, 0) if it is missing."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 

@@ -293,7 +293,7 @@ class OpenedRun:
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
-        # The energies are missing at some states.
+        # The energies are missing in some states.
         energies = give_if_written(lambda: self.part_energies(parts)) if parts else None
         if energies is None:
             return ()
@@ -317,7 +317,7 @@ class OpenedRun:
                 if quantity in database.quantities and quantity not in columns:
                     with suppress(
                         FormatError
-                    ):  # The quantity is missing at some states.
+                    ):  # The quantity is missing in some states.
                         name = database.quantities[quantity]
                         columns[quantity] = database.channel(name)
         return columns

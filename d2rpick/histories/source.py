@@ -160,7 +160,7 @@ def _report_empty(name: str) -> FormatError:
 
 
 def _list_files(name: str) -> Sequence[str]:
-    """Return the files that a name stands for: a file and its later files, or all files in a folder or pattern."""
+    """Return the files that a name stands for: a file and its family, all in a folder, or all that match a pattern."""
     # os.path is used instead of pathlib to keep start-up fast.
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113  pathlib would slow down start-up
         return [name, *_list_later_files(name)]
@@ -299,7 +299,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question that suggests a similar file in the folder, or a hint if the name is a time; else empty."""
+    """Return a question that suggests a similar file in the folder, or a hint if the name is a time, or ""."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"

@@ -33,7 +33,7 @@ STIFFNESS = 5e5
 # Sliding speed below which friction is proportional to the speed [m/s].
 # Typical sliding speeds are 100 times the value of SLIP.
 SLIP = 0.1
-# Largest depth below the floor at which a point touches the floor [m]; deeper points have left the sled.
+# A point up to this depth below the floor [m] touches the floor; deeper points have left the sled.
 DEEPEST = 0.1
 # Thickness of the curb at the end of the sled [m].
 CURB_THICKNESS = 0.05
@@ -46,7 +46,7 @@ SAME_CONTACT = 2e-3
 
 # Safety factor on the stable time step 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# Largest excess over a whole number of time steps that is rounded down, as a fraction of a time step [-].
+# Times that exceed a whole number of time steps by at most this fraction of a time step are rounded down [-].
 _SAME = 1e-6
 
 

@@ -1,4 +1,4 @@
-"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file for ``--weights``."""
+"""Write the result of ``calibrate`` as a table, JSON, CSV or Markdown, and as the TOML file for ``--weights``."""
 
 from __future__ import annotations
 

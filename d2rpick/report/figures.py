@@ -42,7 +42,7 @@ NEUTRAL: Final = "#595959"
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time, as a fraction of the axes [-]; the key is True for a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# Smallest ratio of largest to smallest value at which a logarithmic axis has only marks at powers of ten [-].
+# A logarithmic axis has marks only at powers of ten if its largest value exceeds this multiple of its smallest [-].
 _DECADES: Final = 100.0
 # Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
 STRETCHES: Final = 400
@@ -255,7 +255,7 @@ def add_legend_below(
 
 
 def add_unit(name: str, unit: str) -> str:
-    """Return the label of a time axis, with the unit named in a file, or else "units of the run"."""
+    """Return the label of a time axis, with the unit named in a file, otherwise "units of the run"."""
     return f"{name} [{make_plain_text(unit)}]" if unit else f"{name} (unit of the run)"
 
 

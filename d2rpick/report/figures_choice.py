@@ -324,7 +324,7 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports, or else what must be done first."""
+    """Return the verdict on a window that this run supports; without a verdict, what must be done first."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status

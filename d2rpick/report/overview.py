@@ -1,4 +1,4 @@
-"""Write the result of ``info`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``info`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
 
 
 def _list_selection_options(overview: Overview) -> Iterator[str]:
-    """Yield the options that select the same columns and parts; the default is the flying parts, or else all parts."""
+    """Yield the options that select the same columns and parts; by default, the flying parts, otherwise all parts."""
     selection = overview.selection
     if selection.time is not None:
         yield from ("--time", selection.time)

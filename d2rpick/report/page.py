@@ -344,7 +344,7 @@ def build_refusal(reason: str) -> Markup:
 
 
 def get_title(run: OpenedRun) -> str:
-    """Return the title of the run that the solver wrote, or else the name of the file."""
+    """Return the run title from the solver or, without a title, the file name."""
     return (
         next((database.title for database in run.databases if database.title), "")
         or run.name

@@ -1,4 +1,4 @@
-"""Write the result of ``parts`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``parts`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -322,7 +322,7 @@ def list_heading(answer: Parts) -> list[tuple[str, str]]:
 def build_part_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return header and rows of a table of parts with some columns; parts of the recommended set have a star."""
+    """Return header and rows of a table of parts with the given columns; parts of the recommended set have a star."""
     best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.fill_table(

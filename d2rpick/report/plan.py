@@ -1,4 +1,4 @@
-"""Write the result of ``plan`` as a table, JSON, CSV, Markdown and bare values."""
+"""Write the result of ``plan`` as a table, JSON, CSV, Markdown or bare values."""
 
 from __future__ import annotations
 

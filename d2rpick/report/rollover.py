@@ -1,4 +1,4 @@
-"""Write the scan of ``rollover`` as a table, JSON, CSV and Markdown."""
+"""Write the results of a ``rollover`` scan as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 

@@ -234,7 +234,7 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without the run's name, or else the codes of its warnings; empty without either."""
+    """Return the message of a run without the run's name; if there is none, the codes of its warnings, if any."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 

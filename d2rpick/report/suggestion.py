@@ -1,4 +1,4 @@
-"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown or a bare value."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairSuggestion, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command, which leads to the card of a usable pair or else to a better pair."""
+    """Return the next command, which leads to the card of a usable pair or, if there is none, to a better pair."""
     decision = answer.decision
     situation = answer.situation
     pair = answer.recommended

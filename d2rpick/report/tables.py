@@ -223,7 +223,7 @@ def wrap_command(line: str, width: int) -> str:
 
 
 def _wrap_below_name(line: str, width: int) -> str:
-    """Wrap a line, and indent its continuation lines to the text after the name, or else like the line itself."""
+    """Wrap a line; indent its continuation lines to the text after the name or, without a name, like the line."""
     from textwrap import fill
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)

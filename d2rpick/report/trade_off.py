@@ -1,4 +1,4 @@
-"""Write the result of ``explore`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``explore`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
 def list_next_step(
     trade_off: TradeOff, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command, which leads to the card of the requested or chosen pair, or else to a better pair."""
+    """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
     situation = trade_off.situation

@@ -1,4 +1,4 @@
-"""Write the result of ``verify`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``verify`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ class HistoryJudge:
     def contacts(
         self, parts: Collection[int]
     ) -> tuple[tuple[float, float], ...] | None:
-        """Return the spans in which contact forces act on the given parts [time], from their momenta, or None."""
+        """Find the spans [time] in which contact forces act on the given parts from their momenta; None if unknown."""
         contact_times = self.pushed(parts)
         return contact_times and contact_times.spans
 

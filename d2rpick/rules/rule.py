@@ -1,4 +1,4 @@
-"""Build the rules of ``check``: the `Rule` type, its decorators, and deck fragments for the examples."""
+"""Define what the ``check`` rules are made of: the `Rule` type, its decorators, and deck fragments for the examples."""
 
 from __future__ import annotations
 

@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 # Smallest number of output intervals in a rigid window; they resolve crossings to within 0.5 % of the window.
 _INTERVALS = 200
-# Largest relative excess of an output interval over its limit that is attributed to rounding [-].
+# If an output interval exceeds its limit by at most this fraction, the difference is attributed to rounding [-].
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-# Largest number of cards at which D2R102 and D2R105 would report the same mistake twice.
+# Up to this number of cards, D2R102 and D2R105 would report the same mistake twice.
 _FEW = 2
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]

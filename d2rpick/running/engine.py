@@ -275,7 +275,7 @@ class Solver:
         return self.whole(0) and not has_error
 
     def last_words(self, number: int) -> str:
-        """Return, on one line, the errors that the solver reported, or else the last lines that it printed."""
+        """Return, on one line, the errors that the solver reported or, without errors, its last printed lines."""
         listing = self._read_end(number, ".out", _LISTING_SIZE)
         errors = _split_lines("\n".join(re.findall(_ERROR_LINES, listing)))
         printed = _split_lines(self._read_end(number, ".log") or listing)

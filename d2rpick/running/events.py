@@ -109,7 +109,7 @@ def _describe_start(flight: Quiet) -> Event:
 
 
 def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
-    """Advise when to switch in a flight: at once if nothing vibrates, or else while the internal energy is high.
+    """Advise when to switch in a flight: at once if nothing vibrates, otherwise while the internal energy is high.
 
     If it is low for one wait, the time of its maximum is advised.
     """

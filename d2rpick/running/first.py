@@ -74,7 +74,7 @@ _WITHOUT_OFFSET: Final = (
 # _PUSHES: prefixes of the LS-DYNA keywords for loads that are not contact forces.
 # _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# Gap at which LS-DYNA makes the parts deformable before a contact, in multiples of the largest shell thickness [-].
+# LS-DYNA makes the parts deformable before a contact if the gap is this multiple of the largest shell thickness [-].
 # The gap must exceed the contact thickness, which is half the thickness of each of the two shells.
 _OFFSET_THICKNESSES: Final = 2
 
@@ -152,7 +152,7 @@ def _make_radioss_card(
     wait: Wait,
     after: float | None,
 ) -> PrintedCard:
-    """Print the engine files and sensors of a Radioss run; raise DeckError if contact forces cannot show a flight."""
+    """Print the engine files and sensors of a Radioss run; raise DeckError unless contact forces reveal a flight."""
     run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
@@ -208,7 +208,7 @@ def _make_ls_dyna_card(
     wait: Wait,
     after: float | None,
 ) -> PrintedCard:
-    """Print the switch sets of an LS-DYNA run; raise DeckError if the force of one contact cannot show a flight."""
+    """Print the switch sets of an LS-DYNA run; raise DeckError unless the force of one contact reveals a flight."""
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # Smallest velocity change that counts as an oscillation, relative to the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: fraction of the change that is ignored at each end when a half period is measured [-].
-# _INNER_TIME: fraction of its half period in which a harmonic motion makes the middle part of the change [-].
+# _INNER: fraction of the velocity change ignored at each end when a half period is measured [-].
+# _INNER_TIME: fraction of the half period in which a harmonic motion makes the middle part of that change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
 # Largest mean force in an oscillation treated as body rotation, relative to the largest mean force so far [-].
 _ROTATION: Final = 0.05
@@ -160,7 +160,7 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the internal motion so far, as the waiting time ``wait`` that it requires, or None.
+    """The longest half period of the internal motion so far, and the waiting time ``wait`` that it requires, if any.
 
     ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
     the longest swing, even if a force pushed the swing [time].

@@ -126,9 +126,9 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in the files, without an incomplete last state, and where to continue in each file.
+        """Return the history in the files, without an incomplete last state, and where to resume reading each file.
 
-        The places are {} if the format of a file is always read as a whole.
+        The positions are {} if the format of a file is always read as a whole.
         """
         run = open_sources(sources, self._selection)
         points = join_resume_points(

@@ -72,7 +72,7 @@ class GrowingRecord:
         self.history: History | None = None
 
     def extend(self, states: History) -> History | None:
-        """Append the states after the known ones, and return them; None if the last known states are not among them."""
+        """Append those ``states`` that follow the last known state, and return them; None if that state is missing."""
         tables = _list_tables(states)
         known_tables: list[Any] = [None] * len(tables)
         if self.history:

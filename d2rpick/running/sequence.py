@@ -150,7 +150,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed engine run with its ``cycles`` and CPU time ``cpu`` [s], both None if its listing lacks them."""
+    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing."""
 
     order: Order
     findings: LegFindings
@@ -269,7 +269,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Return the window before the contact that the last engine run showed, or else up to the end of the run."""
+    """Return the window before the contact that the last engine run showed; without contact, up to the end."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
     findings, contact = get_flight_findings(legs), legs[-1].findings.contact
     window = Window(

@@ -28,7 +28,7 @@ _MOST_MISFIT: Final = 0.3
 MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
 # Largest accepted change of the static energy in a record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
-# Largest accepted rms excess of the overlap over its bounds, relative to the vibration energy [-].
+# The overlap may exceed its bounds by at most this fraction of the vibration energy (rms) [-].
 MOST_BEYOND: Final = 0.12
 # Largest accepted height of the harmonics, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
@@ -140,7 +140,7 @@ def measure_doubts(
 
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """Return the rms excess of the overlap over its bounds for pairs of times, relative to the vibration energy [-]."""
+    """Return how far the overlap exceeds its bounds (rms over pairs of times), relative to the vibration energy [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T

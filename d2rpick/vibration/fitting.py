@@ -54,7 +54,7 @@ _NEAR: Final = 1e-6
 MAX_MISFIT: Final = 0.4
 # Safety factor on the largest accepted variance of the misfit if only some of the samples are used [-].
 _FAR_TOO_MUCH: Final = 1.2
-# Largest number of starting values that are refined, because the first one may not be the best.
+# Maximum number of starting values to refine; more than one, because the first may not be the best.
 STARTS: Final = 3
 # No second starting value is tried if the first one leaves less than this fraction of the variance unexplained [-].
 CERTAIN: Final = 0.01

@@ -35,7 +35,7 @@ MIN_SAMPLES_PER_PERIOD: Final = 10
 MAX_GROWTH: Final = 0.3
 # Most negative accepted plastic work, as a fraction of the energy range [-]; fitting errors may make it negative.
 MIN_PLASTIC: Final = -0.05
-# Largest misfit of a vibration without preload that is attributed to a stiffening spring [-].
+# If a vibration without preload has a misfit of at most this, the misfit is attributed to a stiffening spring [-].
 MAX_OF_SPRING: Final = 0.1
 # Assumed hidden fraction of the vibration energy if a stiffening spring replaces a preload [-].
 _OF_A_PRELOAD: Final = 0.03
@@ -117,7 +117,7 @@ def identify(
     quick: bool = False,
     rates: NDArray[np.complex128] | None = None,
 ) -> Identification:
-    """Fit a vibration to E(t), or else one with plastic work, or else one with a preload, and judge the fit.
+    """Fit a vibration to E(t), if necessary one with plastic work or, failing that, a preload, and judge the fit.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge the fits, simplest model first; return the first fit that follows the samples, or else the best fit.
+    """Judge the fits, simplest model first; return the first fit that follows the samples, otherwise the best fit.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """

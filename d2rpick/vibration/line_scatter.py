@@ -27,7 +27,7 @@ _LOOSE_TURNS: Final = 0.5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of R^2 (R: the residual) for one interpretation ``reading`` of the lines on a ``grid``.
+    """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
 
     Neighbouring states have the share ``systematic`` of the misfit in common [-].
     """
@@ -37,7 +37,7 @@ class LineScatter:
     systematic: float
 
     def compute_deviation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the standard deviation of R^2 for pairs of broadcastable times [-]."""
+        """Return the standard deviation of the squared residual for pairs of broadcastable times [-]."""
         tr, td = np.broadcast_arrays(
             np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64)
         )
@@ -81,7 +81,7 @@ class LineScatter:
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of R^2 with respect to the parameters, shape (n, p) [1/energy, time/1].
+        """Return the derivatives of the squared residual by the parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
         """
@@ -112,7 +112,7 @@ class LineScatter:
 
 
 def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
-    """Return the derivatives of the waves at times (n,), shape (n, 4 k).
+    """Return the derivatives of the sum of k waves with respect to their 4 k parameters at times (n,), shape (n, 4 k).
 
     The derivatives are with respect to the real and imaginary parts of the weights, then of the poles.
     """

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
 # NOTABLE: smallest height of a relevant line, relative to the strongest line [-].
-# _NOTABLE_PARTNER: smallest height of a line to which others may be locked, relative to the strongest line [-].
+# _NOTABLE_PARTNER: smallest height of a line whose frequency another may follow, relative to the strongest line [-].
 # ABOVE_SCATTER: smallest height of a relevant line, in standard deviations [-].
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
 # _SAME_RATE: frequencies that differ by at most this are treated as equal [cycles over the record].

@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 
 # Largest increase of the frozen-deformation error within the timing tolerance [-].
 TOLERATED_GROWTH = 0.05
-# Half-width of the error band of R^2 due to noise, in standard deviations; 2.5 cover 98.8 % of normal errors.
+# Half-width of the error band of the squared residual due to noise [standard deviations].
+# In a normal distribution, 98.8 % of the errors lie within 2.5 standard deviations.
 BAND_DEVIATIONS = 2.5
-# Ratio of the part of R^2 that depends on the phases at td to the damping ratio [-]; it is at most 2 in theory.
+# Fraction of the squared residual that depends on the phases at td, per damping ratio [-]; in theory, at most 2.
 _PHASES_COUNT = 1.5
 
 
@@ -180,7 +181,7 @@ def band_about(
 
 
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
-    """Return the fraction of R^2 that depends on the phase of the error at td [-].
+    """Return the fraction of the squared residual that depends on the phase of the error at td [-].
 
     Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
     after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.

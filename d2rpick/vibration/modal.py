@@ -70,30 +70,30 @@ _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
-# _EXACT: modes are exact if their errors are at most this fraction of the limits for evidence of a flight [-].
-# _SLOW_TOO: slow lines are accepted as modes up to this fraction of the limits for evidence of a flight [-].
+# _EXACT: modes are treated as exact if their errors are at most this fraction of the limits for a flight [-].
+# _SLOW_TOO: slow lines are accepted as modes if the errors are at most this fraction of the limits for a flight [-].
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
-# _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
+# _LEAST_HALF: half-width of the error band of the squared residual before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
 # The residual R of a shell box deviated by 0.015 to 0.018 (rms) from the R computed with all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
-# Modes are poorly identified if the half-width of the error band of R^2 exceeds this [-].
+# Modes are poorly identified if the half-width of the error band of the squared residual exceeds this [-].
 _VAGUE_HALF: Final = 0.2
 # Number of times at which the error band is evaluated.
 _SOME_TIMES: Final = 64
-# Effect on R^2 of the energy that the lines do not explain, per fraction of the energy [-].
+# Effect of unexplained energy on the squared residual, per unexplained fraction of the energy [-].
 # Noise at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 standard deviations bound 90 %.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
 # Correlations of neighbouring misfits up to this are treated as noise [standard errors].
 _CHANCE: Final = 2.0
-# _DRIFT_COUNTS: effect on R^2 of a mean energy that changes in the flight, per relative change [-].
-# _NEGATIVE_COUNTS: effect on R^2 of a negative or too small static energy, per relative error [-].
+# _DRIFT_COUNTS: effect of a changing mean energy on the squared residual, per relative change in the flight [-].
+# _NEGATIVE_COUNTS: effect of a negative or too small static energy on the squared residual, per relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
-# _BENT_ALIKE: effect on R^2 of the second harmonic of a stiffening spring, if both deformations are equal [-].
-# _BENT_ACROSS: additional effect on R^2 of the second harmonic, if the deformations are orthogonal [-].
+# _BENT_ALIKE: effect of the second harmonic of a stiffening spring on the squared residual of equal deformations [-].
+# _BENT_ACROSS: additional effect of the second harmonic on the squared residual of orthogonal deformations [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
-# Largest possible R^2, which is that of equal and opposite deformations [-].
+# Largest possible squared residual, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
@@ -137,7 +137,7 @@ class ModalVibration:
     states_per_period : float
         States of the record in a period of the fastest line that is told from noise [-].
     scatter : LineScatter
-        Scatter of R^2 that follows from that of the record.
+        Scatter of the squared residual that follows from that of the record.
     swinging : float
         Mean energy in parts of the record that swing in a way that no mode does [energy].
     bent : float
@@ -281,14 +281,14 @@ class ModalVibration:
         )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return half of the width of the error band of R^2 for pairs of times [-]."""
+        """Return half of the width of the error band of the squared residual for pairs of times [-]."""
         off, below, above = self._compute_errors(tr, td)
         return np.asarray(off + (below + above) / 2)
 
     def _compute_errors(
         self, tr: Samples | float, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the error of R^2 for pairs of times, and by how much other interpretations lower or raise R^2 [-].
+        """Return the error of the squared residual of pairs of times, and how far other readings lower or raise it [-].
 
         Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
         """
@@ -355,7 +355,7 @@ class ModalVibration:
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Return the fraction of vibration energy at td that a hidden mode needs to explain the band of each tr [-].
 
-        A hidden mode in opposite phase at tr and td adds four times its share to R^2.
+        A hidden mode in opposite phase at tr and td adds four times its share to the squared residual.
         """
         return self.half_width(tr, td) / 4
 
@@ -369,7 +369,7 @@ class ModalVibration:
 
     @cached_property
     def _phase_share(self) -> float:
-        """Return the fraction of R^2 that depends on the phases of all modes at td [-]."""
+        """Return the fraction of the squared residual that depends on the phases of all modes at td [-]."""
         modes = self.reading.modes
         poles = modes.poles
         sizes = np.abs(modes.weights)
@@ -392,7 +392,7 @@ class ModalVibration:
     def _compute_shift_of_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> tuple[Samples, Samples]:
-        """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
+        """Return by how much other interpretations of the spectral lines lower and raise the squared residual [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
         that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
@@ -480,7 +480,7 @@ def identify_modal(
 def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Return the result for the internal energy, with a wider band, or else the result for the kinetic energy."""
+    """Return the result from the internal energy with a wider band, or from the kinetic energy if only it is usable."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
@@ -681,12 +681,12 @@ def _read_first_part(
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
-    """Return the error of R^2 due to the relative error ``off`` of the difference of two deformations [-]."""
+    """Return the error of the squared residual due to the relative error ``off`` of a deformation difference [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 
 def _compute_sine(squared: Samples) -> Samples:
-    """Return the sine of the angle between deformations of equal size with R^2 = ``squared``, at least 0 [-]."""
+    """Return the sine of the angle between equally large deformations with the squared residual ``squared`` [-]."""
     return np.asarray(np.sqrt(np.maximum(squared * (4 - squared), 0.0)) / 2)
 
 

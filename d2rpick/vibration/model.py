@@ -52,7 +52,7 @@ _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 NOTHING_KEPT: Final = 1.0
 # A tr in this last fraction of the time before td saves little time [-].
 NEAR_TD: Final = 0.25
-# _OF_INTERVAL: largest assumed distance of a closest match from the true minimum of the error [sampling intervals].
+# _OF_INTERVAL: assumed upper bound of the distance from the best sample to the true error minimum [sampling intervals].
 # _OF_INTERVAL_BY_MODES: the same limit if modes describe the energy between the states [sampling intervals].
 # For modes, 93 % of 2200 closest matches were within 1/8 interval of the minimum; the other errors hardly changed.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
@@ -450,7 +450,7 @@ def is_doubtful(whole: Vibration) -> bool:
 
 
 def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Return the reliable model of the total energy at ``td``: an oscillator, or else the samples."""
+    """Return the reliable model of the total energy at ``td``: an oscillator if possible, otherwise the samples."""
     fit = evidence.fit
     whole = describe_energy_at(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
@@ -491,7 +491,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
 def describe_energy_at(
     history: History, td: float, evidence: Evidence
 ) -> SampledEnergy:
-    """Return the best description of the energy, even if unreliable at ``td``: an oscillator, or else the samples."""
+    """Return the best description of the energy, even if unreliable at ``td``: an oscillator, otherwise the samples."""
     fit = evidence.fit
     span = evidence.span
     if fit and fit.mode and span:

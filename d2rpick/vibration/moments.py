@@ -63,7 +63,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return the energy at a time [energy], from the modes if they describe that time, or else from the samples."""
+        """Return the energy at a time [energy], from the modes if they describe that time, otherwise the samples."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)

@@ -36,7 +36,7 @@ _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Further trial windows are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
-# Ratio of the distances from the start at which successive marks lie [-].
+# Ratio of the distances of successive marks from the start [-].
 _MARKS = 0.87
 # _LEAST_PERIODS: smallest number of periods in a window that an oscillator describes; fewer may fit by chance.
 # _MOST: shortest window that an oscillator may describe, as a fraction of the initially fitted window [-].
@@ -56,7 +56,7 @@ _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
 MOST_REFITS = 8
 
-# Largest energy of a hidden mode that is ignored, relative to the vibration energy [-]; it is a solver error.
+# Hidden modes with at most this fraction of the vibration energy are treated as solver errors and ignored [-].
 SMALLEST: Final = 1e-3
 # Largest number of lines in a spectrum, which suffices for 800 energy periods.
 _MOST_LINES: Final = 8192
@@ -179,7 +179,7 @@ def _estimate_what_is_hidden(
 def find_described_span(
     search: SpanSearch, td: float
 ) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that a single oscillator describes, or else the last such window before td.
+    """Find the longest window around td that a single oscillator describes; otherwise, the last such window before td.
 
     First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
     grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
@@ -477,7 +477,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     misfit = energy - mode.energy(time)
     remainder = average_cells(s, integrate_by_trapezia(s, misfit), count)
     decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
-    # The frequencies range from one period in the record to the highest frequency that the cells resolve.
+    # The frequencies range from one period per record to the highest frequency that the averaging cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     lines = np.abs(np.fft.rfft(remainder * decay, _FINER * count))
     strongest = float(lines[visible].max())

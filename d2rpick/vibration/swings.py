@@ -43,7 +43,7 @@ _MOST_BEATING, _STRETCHED = 0.75, 1.3
 _OF_ANY_SPRING: Final = 1.5
 # _OF_THE_FLOOR: effect of a hidden mode on the residual, per square root of its energy fraction [-].
 # In theory, the factor is 2, but the lower envelope shows only a part of a hidden mode.
-# _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
+# _UNRESOLVED: additional contribution to the residual from motion that the states do not resolve [-].
 # In 1,378 records of two modes, 98.2 % of the residuals below 0.3 lay in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05
 

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 # Relative error of vibration energies that are derived from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest assumed number of similar modes with random phases; a computed car model had 100 such modes.
+# Assumed upper bound of the number of similar modes with random phases; a computed car model had 100 such modes.
 # The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# Largest relative excess of the mean energy after td over its prediction from spectral lines [-].
+# The mean energy after td may deviate from its prediction from spectral lines by at most this fraction [-].
 _OF_SOLVER: Final = 0.005
 # Smallest number of states needed to determine the fluctuation of the energy.
 _FEWEST_STATES: Final = 8

@@ -82,7 +82,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """The error by which candidates are ranked [-]: the residual, or else the level error; infinite if unknown."""
+        """The error that ranks the candidates [-]: the residual if known, otherwise the level error or infinity."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
@@ -253,7 +253,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Return the candidates in the given ``rows``, without their objections."""
+        """Return the candidates in the given ``rows``, without the objections to them."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Largest assumed error of the energies that a solver writes, as a fraction of the highest energy [-].
+# Assumed upper bound of the error in energies from the solver, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
 # Largest energy fluctuation that is ignored, as a fraction of the largest vibration energy after the load [-].
 _FAINT: Final = 1e-4
@@ -231,7 +231,7 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance or, for many modes, the limit of their model."""
+        """Largest acceptable error of a tr [-]: the tolerance or, if there are many modes, the limit of their model."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
@@ -244,7 +244,7 @@ class Situation:
         )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or else the samples."""
+        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or the samples."""
         return describe_energy_at(self.history, self.td, self.evidence).peaks(
             start, end
         )
@@ -393,7 +393,7 @@ def _limit_start(situation: Situation, since: float) -> Situation:
 
 
 def _get_bounds(history: History, seen: Seen) -> Span:
-    """Return the bounds of the flight according to the evidence, or else those of the whole record [time]."""
+    """Return the bounds of the flight according to the evidence; without evidence, those of the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
     return Span(history.start, history.end)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# Smallest number of states per energy period at which modes of higher frequency can be detected.
+# Modes of higher frequency can be detected only with at least this number of states per energy period.
 _FEW_STATES = 4
 # Kinetic fraction at td above which every tr loses more than half of the vibration energy [-].
 POOR_KINETIC_SHARE = 0.5
@@ -158,7 +158,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    # If the situation has a refusal, the refusal already contains this message.
+    # If the flight is refused, the reason for the refusal already contains this warning.
     elif td <= earliest and not flight.refusal:
         yield Caution(
             "td-in-load",

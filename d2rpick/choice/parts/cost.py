@@ -225,7 +225,7 @@ class CostModel:
 
 
 def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
-    """Return the sum of costs, with all formulations that have no weight."""
+    """Return the total cost, and the formulations that it omits because they have no weight."""
     cost = 0.0
     unknown = list[str]()
     for amount in amounts:

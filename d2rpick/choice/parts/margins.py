@@ -52,7 +52,7 @@ def _compute_drift(
 
 
 def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
-    """Return the given margin, or else the time by which a switch in the flight may bring the contact forward."""
+    """Return the given margin or, by default, the time by which a switch in the flight may advance the contact."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
     history, flight = restore_parts(history, flight)

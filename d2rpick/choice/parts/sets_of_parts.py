@@ -306,7 +306,7 @@ class _SetComparison:
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set with its costs and errors, for a given (tr, td) or td, or else for the best td of the set."""
+        """Complete a set with its costs and errors, for a given (tr, td) or td (default: the best td of the set)."""
         reasons = list[str | None]()
         if self.model:
             share = self.model.saved(part_set.parts)

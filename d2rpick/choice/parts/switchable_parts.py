@@ -143,7 +143,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together, or else of all deformable parts; also the flying parts."""
+    """Return the energy of the parts that fly together (all deformable parts if none fly), and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -314,7 +314,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the type of a part: "spring" or "particles" according to its elements, or else its type of material."""
+    """Return the type of a part: "spring" or "particles" according to its elements, otherwise its material type."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:

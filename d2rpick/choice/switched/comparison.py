@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest relative difference between the energies of two runs of the same model before the switch [-].
+# Two runs are of the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
 # Fraction of the record in which runs are assumed to be deformable if the time of the switch is unknown [-].
 _EARLY: Final = 0.1
-# Largest relative deviation of the momentum after td at which the motions of both runs are treated as equal [-].
+# The motions of both runs are treated as equal if the momenta after td differ by at most this fraction [-].
 MOST_MOMENTUM_ERROR = 0.05
 # Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
@@ -126,7 +126,7 @@ def compare_with_reference(
 
 
 def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:
-    """Return the momentum of some parts; None if the run lacks one of these parts or its momentum."""
+    """Return the momentum of the given parts; None if the run lacks one of these parts or its momentum."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 

@@ -350,7 +350,7 @@ def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or else all parts, that have internal energy; ``among`` restricts the choice."""
+    """Return the chosen parts (by default all) that have internal energy; ``among`` restricts the choice."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()

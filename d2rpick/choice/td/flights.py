@@ -171,7 +171,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 def _find_flights_without_landing(
     history: History, settings: Settings
 ) -> tuple[Flight, ...]:
-    """Find the flights from forces, momenta and energies, else from an oscillator or modes, else from quiet times."""
+    """Find the flights from forces, momenta and energies; failing that, from an oscillator or modes, or quiet times."""
     witnessed = find_all_seen(history)
     if witnessed:
         return tuple(

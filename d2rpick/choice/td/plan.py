@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# Smallest length ratio of a later window to an earlier window at which the earlier window is left out [-].
+# An earlier window is left out if a later window is longer than this multiple of its length [-].
 # If a window of length w and a later window of length W are used, two successive runs are rigid for w and w + W.
 # If only the later window of length W is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0

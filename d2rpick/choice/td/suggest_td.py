@@ -98,7 +98,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Return the index of the first state with an energy at or beyond each level, or else the number of states.
+    """For each level, return the index of the first state whose energy reaches it; the number of states if none does.
 
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
@@ -520,7 +520,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; else infinity."""
+    """Return the smallest frozen-deformation error [-] in a range of tr, and its tr [time]; infinite without any tr."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:

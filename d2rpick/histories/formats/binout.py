@@ -119,7 +119,7 @@ class Binout(Database):
         return self._nodes.time
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some nodes since the start of the run, shape (k, len(ids), 3)."""
+        """Return the displacements of the given nodes since the start of the run, shape (k, len(ids), 3)."""
         components = [self._nodes.part_channel(name, ids) for name in _DISPLACEMENTS]
         return np.stack(components, axis=2)
 

@@ -293,7 +293,7 @@ class Branch(Database):
         return column
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a variable of some parts, shape (n, len(ids))."""
+        """Return a variable of the given parts, shape (n, len(ids))."""
         columns = np.empty((self._numbers.size, len(ids)))
         for group, variable in self.checked(quantity):
             for part in group.chunks(max(variable.count, len(ids))):

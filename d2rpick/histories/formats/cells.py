@@ -96,7 +96,7 @@ def is_skipped(line: str) -> bool:
 
 
 def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
-    """Return the number in a cell, or None; unlike Python's float, reject words (``nan``) and underscores.
+    """Return the number in a cell, None if it has none; unlike Python's float, reject words (``nan``) and underscores.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
-    """Return the text of a number without thousands separators and with an ASCII minus sign, or None."""
+    """Return the text of a number without thousands separators and with an ASCII minus sign; None if it is invalid."""
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-")
     if thousands and thousands in cell:

@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name denotes internal energy, or else the only column besides the time."""
+        """The column whose name denotes internal energy, otherwise the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
@@ -296,7 +296,7 @@ class Table(Database):
         )
 
     def find(self, wanted: str) -> str:
-        """Return the channel name of a column given by name or 1-based number; else a FormatError lists the columns."""
+        """Return the channel name of a column given by name or 1-based number; raise FormatError if there is none."""
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = find_column(self.source, self._layout, wanted)

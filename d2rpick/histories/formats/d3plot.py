@@ -154,7 +154,7 @@ class D3plot(Database):
         )
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of some parts, shape (n, len(ids)); a momentum is computed as mass times velocity.
+        """Return a quantity of the given parts, shape (n, len(ids)); a momentum is computed as mass times velocity.
 
         Raises
         ------

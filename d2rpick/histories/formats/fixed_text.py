@@ -325,7 +325,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` if their layout is a recent one; else None."""
+        """Return example, stride and count of the blocks at ``position`` if their layout is recent, otherwise None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -350,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the recent example block that the last block of the file resembles, or else the last block itself."""
+        """Return the recent example block that the last block of the file resembles; otherwise, this last block."""
         alike = (
             example
             for example, stride in recent

@@ -238,7 +238,7 @@ def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Yield the columns of a matrix along the axis that has one title per column, or else along the shorter axis."""
+    """Yield the columns of a matrix along the axis that has one title per column, otherwise along the shorter axis."""
     rows, width = dataset.shape
     if rows == width:
         return

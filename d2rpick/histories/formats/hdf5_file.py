@@ -120,7 +120,7 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column whose name denotes an internal energy, or else the only column besides the time.
+        """The only column whose name denotes an internal energy, otherwise the only column besides the time.
 
         Raise a FormatError that lists all columns if there is no such column.
         """

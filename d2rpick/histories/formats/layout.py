@@ -1,4 +1,4 @@
-"""Find the layout of a table in a text: separator, decimal sign, first row, names and units."""
+"""Find the layout of a table in a text file: separator, decimal sign, first row, names and units."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Layout(NamedTuple):
         return self.columns if self.sure is None else self.sure
 
     def number(self, cell: str) -> float | None:
-        """Return the number in a cell, or None."""
+        """Return the number in a cell; None if the cell does not contain a number."""
         return parse_cell(cell, self.decimal, self.thousands)
 
     def plain(self, cell: str) -> str:

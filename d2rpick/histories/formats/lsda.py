@@ -56,7 +56,7 @@ _TYPES: Final = {
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# Smallest number of repetitions at which comparing arrays is faster than reading the records.
+# With at least this number of repetitions, comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
 # Pattern of the names of state directories: d and the state number (18 digits fit into an int64).

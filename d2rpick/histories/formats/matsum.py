@@ -71,7 +71,7 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-# Pattern of the numbers in those lines that may differ between states.
+# Pattern of the numbers that may differ from state to state.
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 

@@ -36,7 +36,7 @@ _SHAPE: Final = re.compile(
 _LONG, _SHORT = 10, 5  # Number of columns of an integer in the two text formats.
 # Characters that Fortran prints in place of a number that is too long for its field.
 _STARS: Final = b"*" * _SHORT
-# Largest length of a header record without its integers [bytes].
+# Maximum length of a header record, excluding its integers [bytes].
 _ROOM: Final = 1024
 # Number of characters of the run title in text files (binary files have 80).
 _RUN_TITLE: Final = 72

@@ -199,7 +199,7 @@ class TimeHistory(Database):
         return tuple(self._displacement_columns)
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some nodes since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of the given nodes since the start of the run, shape (n, len(ids), 3)."""
         places = [self._displacement_columns[id_] for id_ in ids]
         moved = [self._columns(record, columns) for record, columns in places]
         return np.stack(moved, axis=1)
@@ -246,7 +246,7 @@ class TimeHistory(Database):
         return self.time
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a variable of some parts, shape (n, len(ids)).
+        """Return a variable of the given parts, shape (n, len(ids)).
 
         Raises
         ------

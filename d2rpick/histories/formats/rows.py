@@ -204,7 +204,7 @@ class _Curve:
             )
 
     def _check_repeated(self, number: int, state: Sequence[float]) -> None:
-        """Raise FormatError unless a row below the table repeats the next row of the table."""
+        """Raise FormatError unless the rows below a table repeat the rows of that table in their order."""
         self.keep_piece()
         if len(self._read) > 1:
             self._read = [np.concatenate(self._read)]

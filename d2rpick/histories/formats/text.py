@@ -45,7 +45,7 @@ class Text:
     top = HEAD
     # Number of bytes that are read at a time; their cells fit into the processor cache.
     piece = 1 << 17
-    # Largest size of a text at which the printed precision is determined from all fields [bytes].
+    # If a text has at most this size [bytes], the printed precision is determined from all fields.
     short = 1 << 16
     # Number of lines that are sampled at the start, at the end and in between if a text is longer.
     some = 100
