@@ -39,7 +39,7 @@ class RunQuestion(NamedTuple):
     """A question: the opened run, the selected energy, and the settings that determine how the run is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
-    deck.  ``on_card`` are parts that only the card contains.
+    deck.  ``on_card`` are parts that only the card contains, ``merge`` the part into which all are merged there.
     """
 
     run: Run
@@ -52,6 +52,7 @@ class RunQuestion(NamedTuple):
     cautions: tuple[Caution, ...] = ()
     # False if the deck belongs to another run.
     of_this_run: bool = True
+    merge: int | None = None
 
     @property
     def deck(self) -> str | None:
@@ -70,11 +71,14 @@ class RunQuestion(NamedTuple):
         """Parts of the command line with which other commands ask about the same run."""
         if self.unused_deck:
             question = self.request.repeat(without=("deck", "weights", "step_ratio"))
-            return question._replace(
+            question = question._replace(
                 options=("--no-deck", *question.options),
                 judging=(*question.judging, "--no-deck"),
             )
-        return self.request.repeat()
+        else:
+            question = self.request.repeat()
+        merging = () if self.merge is None else ("--merge", str(self.merge))
+        return question._replace(card=merging)
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -196,7 +200,9 @@ def ask_run(
         cautions,
         of_this_run=not foreign,
     )
-    return question if merge is None else _merge_parts(question, merge)
+    if merge is None:
+        return question
+    return _merge_parts(question._replace(merge=merge), merge)
 
 
 def read_cost_model(request: Request) -> CostModel | None:

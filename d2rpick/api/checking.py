@@ -56,6 +56,12 @@ class Findings(Answer, Checks):
         )
 
     @property
+    def has_only_infos(self) -> bool:
+        """True if all decks were checked, and no finding is an error or a warning."""
+        severities = {finding.severity for finding in self.findings}
+        return not self.failed and severities <= {Severity.INFO}
+
+    @property
     def decks(self) -> tuple[str, ...]:
         """Names of the main decks that were checked."""
         return tuple(result.deck for result in self.results)

@@ -327,6 +327,16 @@ class PairSuggestion(AnswerAtTd):
         examined = _examine_anew(self.situation, better.td)
         return verify_at(examined, better.tr)._decide(None)
 
+    @cached_property
+    def decision_on_longer(self) -> Decision | None:
+        """Verdict on the longer pair by the rules of ``verify``; None if there is no longer pair."""
+        longer = self.longer
+        if longer is None:
+            return None
+        return verify_at(_examine_anew(self.situation, longer.td), longer.tr)._decide(
+            None
+        )
+
     def decision_on(self, candidate: Candidate) -> Decision:
         """Return the verdict on one of the candidates by the rules of ``verify``."""
         objections = () if candidate.admissible else candidate.notes

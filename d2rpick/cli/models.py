@@ -27,6 +27,7 @@ SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
 }
+_SOLVER_COLUMNS: Final = ", or ".join(map(", ".join, SOLVER.values()))
 SECTIONS = ("1", "2", "3", "4", "5")
 _ABSENT = (
     "reproduce needs the folder validation of the repository, which is not installed with the package; clone the "
@@ -160,8 +161,8 @@ def _scan(box: Box, output: Output) -> None:
 )  # fmt: skip
 @options.make_file_option(
     "--solver",
-    "Table of a solver's runs of the same oscillator, for comparison, with time_s and {', or '.join(', "
-    "'.join(columns) for columns in SOLVER.values())}; repeatable.",
+    f"Table of a solver's runs of the same oscillator, for comparison, with the columns time_s and {_SOLVER_COLUMNS}; "
+    "repeatable.",
     many=True,
 )
 @options.add_options(

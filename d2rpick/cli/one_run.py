@@ -44,6 +44,7 @@ from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
+    from d2rpick.api.checking import Findings
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -478,9 +479,11 @@ def plan(
         answer.printed(cards, every=every) if form == "card" or write_deck else None
     )
     if judged_card and write_deck:
-        checked, passed = _write_and_check(judged_card, answer, write_deck, output)
+        checked, findings = _write_and_check(judged_card, answer, write_deck, output)
+        passed = findings.passed
+        written = WrittenDeck(write_deck, passed, not findings.has_only_infos)
     else:
-        checked, passed = ("", True)
+        checked, passed, written = ("", True, None)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
@@ -496,9 +499,7 @@ def plan(
             question=question.repeated._replace(
                 times=options.write_times(min_rigid=min_rigid, done=done, before=before)
             ),
-            written_deck=WrittenDeck(write_deck, passed)
-            if write_deck and checked
-            else None,
+            written_deck=written,
         )
         passed &= bool(answer.supported)
     if question.unused_deck:
@@ -534,20 +535,18 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
-) -> tuple[str, bool]:
+) -> tuple[str, Findings]:
     """Write the copy of the deck and check it against the history.
 
     Returns
     -------
     text : str
         The written files, and below them the output of ``check --history`` for the deck.
-    passed : bool
-        True if no finding is an error.
+    findings : Findings
+        What the check found.
     """
     from d2rpick.api.plans import write_planned_deck
 
     names, checked = write_planned_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
-    return "\n".join(
-        [*listed, "", checked.text("table", output.shown())]
-    ), checked.passed
+    return "\n".join([*listed, "", checked.text("table", output.shown())]), checked

@@ -61,6 +61,12 @@ _DELETED = (
     "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
     "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
 )
+_SEPARATE = (
+    "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
+    "  wrong for parts that share nodes, and nothing shows here whether they do.",
+    "  Give the main deck and a history of these parts (--deck), or merge such",
+    "  parts (d2rpick card --merge), never loose ones.",
+)
 _CAPPED = "DTMAX limits the time step, which would grow if no deformable part is left."
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
@@ -243,7 +249,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
             if len(body) > 1
         )
     elif printing.merge is None and len(ids) > 1:
-        yield "Merge parts that share nodes (d2rpick card --merge), never loose ones."
+        yield from _SEPARATE
     elif printing.merge is not None and printing.merge not in ids:
         yield f"Part {printing.merge} is the lead: it must be rigid already."
 

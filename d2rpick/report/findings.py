@@ -103,7 +103,11 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
     lines: list[str] = []
     for result in checks.results:
         lines.append(_format_path(result.deck, checks.root))
-        if not result.cards and not result.windows:
+        if _switches_at_unknown_times(result):
+            lines.append(
+                "  switches itself by forces or sensors of the run; its times are not judged"
+            )
+        elif not result.cards and not result.windows:
             lines.append("  no switching cards")
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
@@ -118,6 +122,11 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
     )
 
 
+def _switches_at_unknown_times(result: Checked) -> bool:
+    """Return True if the run itself decides when a deck switches, and no history shows these times."""
+    return result.switches_itself and not result.windows
+
+
 def _name_next_step(checks: Checks) -> str:
     """Return what to do after the check, with a command that can be copied."""
     serious = [
@@ -127,11 +136,17 @@ def _name_next_step(checks: Checks) -> str:
         if finding.severity is not Severity.INFO
     ]
     if serious:
-        explain = tables.quote_shell_line(("d2rpick", "rule", serious[0].rule))
-        return (
-            f"correct the deck where a line above says so; {explain} explains the first"
-        )
+        worst = min(serious, key=lambda finding: finding.severity.rank)
+        explain = tables.quote_shell_line(("d2rpick", "rule", worst.rule))
+        return f"correct the deck where a line above says so; {explain} explains the worst of them"
     decks = tables.make_positional([result.deck for result in checks.results])
+    itself = next(filter(_switches_at_unknown_times, checks.results), None)
+    if itself:
+        folder = tables.make_positional([os.path.dirname(itself.deck) or os.curdir])  # noqa: PTH120  a name with a NUL byte has no folder
+        follow = tables.quote_shell_line(("d2rpick", "follow", *folder))
+        return (
+            f"run the deck; {follow} shows meanwhile when the parts fly and are rigid"
+        )
     if not any(result.cards for result in checks.results):
         return "if the run is to be switched, choose the times with d2rpick plan HISTORY, and add the cards to the deck"
     if checks.history is None:

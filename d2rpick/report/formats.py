@@ -35,10 +35,14 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class WrittenDeck(NamedTuple):
-    """The folder of the deck that contains the cards of a plan, and whether the deck ``passed`` its check."""
+    """The folder of a deck that was written with the cards of a plan, and the result of its check.
+
+    ``passed`` is True if the check found no error, ``warned`` if it found an error or a warning.
+    """
 
     folder: str
     passed: bool
+    warned: bool
 
 
 class RepeatedQuestion(NamedTuple):
@@ -56,6 +60,8 @@ class RepeatedQuestion(NamedTuple):
         All options and files by which ``card`` judges in the same way.
     files : tuple of str
         Files of the history.
+    card : tuple of str
+        Options of the card, which only a command that prints a card accepts.
     """
 
     times: tuple[str, ...] = ()
@@ -63,6 +69,7 @@ class RepeatedQuestion(NamedTuple):
     options: tuple[str, ...] = ()
     judging: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    card: tuple[str, ...] = ()
 
 
 class DisplayOptions(NamedTuple):

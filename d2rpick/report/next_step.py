@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 # Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
 _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
+# Main deck in a command if the user has to name it, and the folder for the copy of it.
+_SOME_DECK: Final = "DECK"
+_FOLDER: Final = "switched"
+# Why the card of several parts needs the main deck.
+_NEEDS_DECK: Final = (
+    f" (main deck of the run instead of {_SOME_DECK}; "
+    "without it, parts that share nodes become separate rigid bodies)"
+)
 
 
 def write_command(
@@ -29,6 +37,28 @@ def write_command(
     return quote_shell_line(
         ("d2rpick", name, *words, *parts, *question.options, *files)
     )
+
+
+def needs_deck(history: History, settings: Settings) -> bool:
+    """Return True if it is unknown which of several parts share nodes, so that an LS-DYNA card may not merge them."""
+    from d2rpick.deck.printing import SOLVERS, find_solver
+
+    switches_parts = SOLVERS[find_solver(history.format)].switches == "part"
+    return switches_parts and not settings.bodies and len(history.parts or ()) > 1
+
+
+def name_step_to_deck(question: RepeatedQuestion) -> str:
+    """Return the step that writes a copy of the main deck with the cards of a plan, and then runs this copy."""
+    words = ("--deck", _SOME_DECK, "--write-deck", _FOLDER)
+    line = write_command(_allow_deck(question), "plan", *question.times, *words)
+    return f"write a copy of the deck with the cards: {line}{_NEEDS_DECK}. Then run the deck in {_FOLDER} from t = 0"
+
+
+def _allow_deck(question: RepeatedQuestion) -> RepeatedQuestion:
+    """Return the question without the option that forbids a deck."""
+    options = tuple(word for word in question.options if word != "--no-deck")
+    judging = tuple(word for word in question.judging if word != "--no-deck")
+    return question._replace(options=options, judging=judging)
 
 
 def name_step_to_card(
@@ -69,7 +99,12 @@ def name_step_to_card(
         hint = f" (main nodes of your rigid bodies instead of {_SOME_NODE})"
     elif not history.parts:
         words = (*words, "--part", _SOME_PART)
-        hint = f" (ids of your parts instead of {_SOME_PART})"
+        hint = f" (ids of your parts instead of {_SOME_PART}; add --merge ID if parts share nodes)"
+    elif needs_deck(history, settings):
+        words = (*words, "--deck", _SOME_DECK)
+        hint = _NEEDS_DECK
+        question = _allow_deck(question)
+    words = (*words, *question.card)
     if command == "card":
         line = quote_shell_line(("d2rpick", "card", *words, *question.judging))
     else:

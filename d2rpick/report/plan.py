@@ -24,6 +24,8 @@ from d2rpick.report.fields import (
 from d2rpick.report.next_step import (
     name_step_after_refusal,
     name_step_to_card,
+    name_step_to_deck,
+    needs_deck,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -313,10 +315,14 @@ def list_next_steps(
     step = f"{cards}. Then add them to the deck, and run the deck from t = 0"
     if cards.startswith("choose"):
         step = cards
+    elif needs_deck(plan.history, plan.settings):
+        step = name_step_to_deck(question)
     if written_deck:
         step = f"run the deck in {written_deck.folder} from t = 0"
         if not written_deck.passed:
             step = f"correct what the check of the written deck found, then {step}"
+        elif written_deck.warned:
+            step = f"{step}, after reading the warnings of its check below"
     again = (
         ". Then plan the remaining flights from that run (--done)" if waiting else ""
     )
@@ -390,11 +396,10 @@ def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
     """Return the rigid time sacrificed for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
-    pairs = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
-        (f"flight {number}", describe_given_up_time(pair.longer, pair.recommended))
-        for number, pair in pairs
-        if pair.longer and pair.recommended
+        (f"flight {row.number}", describe_given_up_time(row.answer))
+        for row in supported
+        if row.answer and row.answer.longer and row.answer.recommended
     ]
     assumed = [
         row

@@ -298,9 +298,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
             )
         )
     if answer.longer and answer.recommended:
-        lines.append(
-            ("longer", describe_given_up_time(answer.longer, answer.recommended))
-        )
+        lines.append(("longer", describe_given_up_time(answer)))
     return lines
 
 
@@ -318,12 +316,11 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
     return f"out of place by {size} at td{body}{taken}: {best.position_error_part} is frozen at another place"
 
 
-def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Describe the rigid time sacrificed for a better level or residual, and the improvement."""
-    if longer.residual is None:
-        better_quality = "a lower level at td"
-    else:
-        better_quality = f"residual {tables.format_measure(longer.residual)}"
+def describe_given_up_time(answer: PairSuggestion) -> str:
+    """Describe the rigid time given up by the recommended pair of an answer with a longer one, and the reason."""
+    longer, chosen = answer.longer, answer.recommended
+    assert longer is not None
+    assert chosen is not None
     lost = longer.rigid_time - chosen.rigid_time
     times = (
         f"tr = {longer.tr:.6g}, td = {longer.td:.6g}, rigid for {longer.rigid_time:.6g}"
@@ -331,7 +328,29 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
     shorter = (
         f"the recommended window is {lost:.3g} ({lost / longer.rigid_time:.0%}) shorter"
     )
-    return f"a longer window exists ({times}), but it has {better_quality}; {shorter}"
+    return f"a longer window exists ({times}), but {_explain_shorter_window(answer, longer, chosen)}; {shorter}"
+
+
+def _explain_shorter_window(answer: PairSuggestion, longer: Pair, chosen: Pair) -> str:
+    """Return why a longer pair was not chosen: its verdict, its residual or the bound of it, its level, or its tr."""
+    decision, own = answer.decision_on_longer, answer.decision
+    if decision and own and not decision.reaches(own.grade):
+        return f"its verdict is {decision.verdict!r}, because {decision.reason}"
+    if longer.residual is None or chosen.residual is None:
+        return "it has a lower level at td"
+    format_measure = tables.format_measure
+    residual = format_measure(longer.residual)
+    if longer.residual > chosen.residual and residual != format_measure(
+        chosen.residual
+    ):
+        return (
+            f"it has residual {residual} instead of {format_measure(chosen.residual)}"
+        )
+    bounds = longer.residual_high, chosen.residual_high
+    highest, own_highest = map(format_measure, bounds)
+    if (bounds[0] or 0.0) > (bounds[1] or 0.0) and highest != own_highest:
+        return f"its residual may be up to {highest}, that of the recommended window up to {own_highest}"
+    return "its tr is less certain"
 
 
 def describe_acceptable_windows(

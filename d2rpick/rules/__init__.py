@@ -211,6 +211,7 @@ class CheckedWindow(NamedTuple):
 class Checked(NamedTuple):
     """Result of the check of one deck: the number of its switching ``cards``, and all ``files`` that were read.
 
+    ``switches_itself`` is True if forces or sensors of the run switch parts, at times that the deck does not contain.
     ``remarks`` report comments in the deck that silence no rule, ``notes`` report settings that are not used.
     """
 
@@ -222,6 +223,7 @@ class Checked(NamedTuple):
     remarks: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     solver: str = LS_DYNA
+    switches_itself: bool = False
 
 
 def find_configuration(
@@ -307,6 +309,7 @@ def check_deck(
         tuple(case.deck.files),
         remarks,
         solver=case.solver,
+        switches_itself=case.switches_itself,
     )
 
 

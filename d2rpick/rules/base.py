@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.caching import cached_property
@@ -137,6 +138,14 @@ class Case:
     def switching(self) -> int:
         """Return the number of switching cards."""
         return len(self.sets)
+
+    @property
+    def switches_itself(self) -> bool:
+        """Return True if a force or a sensor of the run switches parts, at times that the deck does not contain."""
+        return any(
+            not header.code.problem and header.code.value in (*_BY_FORCE, BY_SENSOR)
+            for _, header in self.headers
+        )
 
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, SwitchHeader], ...]:
@@ -413,6 +422,16 @@ class RunCase(Case):
         """Return the total number of switching cards in engine runs, bodies with a sensor, and rigid parts."""
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
+
+    @property
+    def switches_itself(self) -> bool:
+        """Return True if a sensor switches a body, or ends an engine run after which bodies are switched."""
+        bodies = self.run.starter.bodies if self.run.starter else ()
+        by_leg = any(
+            leg.sensor and (leg.switched or following.switched)
+            for leg, following in pairwise(self.run.legs)
+        )
+        return by_leg or any(body.sensor for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:

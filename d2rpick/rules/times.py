@@ -182,13 +182,13 @@ def _check_zero_times(case: Case) -> Iterator[Objection]:
 @make_rule_decorator(
     "D2R111",
     WARNING,
-    "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
+    "*DATABASE_GLSTAT/_MATSUM missing, or their DT above (td-tr)/200",
 )
 def _check_sampling(case: Case) -> Iterator[Objection]:
     """Switching times are chosen from the internal energy of a reference run: glstat contains the energy of the whole
     model, and matsum contains the energy of each part. If the output interval is too long, the energy at tr and td is
-    not known well enough. This rule does not apply to decks that contain only switching cards, or to checks with
-    --history.
+    not known well enough. A switched run is compared with its reference run by the same output (verify --switched),
+    so the rule applies to checks with --history, too. It does not apply to decks that contain only switching cards.
 
     Fix: Add *DATABASE_GLSTAT and *DATABASE_MATSUM with a DT of at most 1/200 of the shortest rigid window.
     """
@@ -198,7 +198,7 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
         if window.td is not None
     ]
     spans = [span for span in spans if span > 0]
-    if case.judge is not None or not spans:
+    if not spans:
         return
     limit = min(spans) / _INTERVALS
     missing = []
@@ -216,12 +216,18 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
         if interval <= 0:
             missing.append(f"*{keyword} with DT above 0")
         elif interval > limit * (1 + _ROUNDING):
-            problem = f"DT of *{keyword} is {interval:g}, too long to choose switching times from its energies"
+            problem = (
+                f"DT of *{keyword} is {interval:g}, too long to choose switching times from its energies, "
+                "or to compare a switched run with its reference run"
+            )
             why = f"expected at most {limit:g}: {_INTERVALS} intervals in the shortest rigid window"
             yield value.field, f"{problem} ({why}); reduce DT"
     whole = case.whole or (case.parts.all_known and case.end_time is not None)
     if missing and whole:
-        problem = f"the deck has no {' and no '.join(missing)}, so there is no energy history to choose the times from"
+        problem = (
+            f"the deck has no {' and no '.join(missing)}, so its run writes no energies: no times can be chosen from "
+            "them, and a switched run cannot be compared with its reference run"
+        )
         first = next(window for window in case.windows.windows if window.closed)
         yield first.opened.by.card.here, f"{problem}; add what is missing"
 

@@ -98,10 +98,10 @@ def _describe_start(flight: Quiet) -> Event:
     """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
     landing = "landing time unknown"
     if flight.level is not None:
-        landing = f"on level ground it lands at about {flight.level:.4g}"
+        landing = f"landing at about {flight.level:.4g} if it lands as high as it took off, later if lower"
     message = (
-        f"{flight.quantity} is constant within {flight.left:.1e} of its maximum for {flight.seen - flight.start:.4g}; "
-        f"required force-free time {flight.wait.time:.4g}: {flight.wait.reason}; {landing}"
+        f"no force for {flight.seen - flight.start:.4g}, the required force-free time is {flight.wait.time:.4g} "
+        f"({flight.wait.reason}); {flight.quantity} is constant within {flight.left:.1e} of its maximum; {landing}"
     )
     return Event(
         "flight", flight.start, flight.seen, message, flight.wait.time, flight.left
@@ -125,13 +125,19 @@ def _suggest_switch(history: History, flight: Quiet) -> Iterator[Event]:
             return
         energies_so_far = history.between(now - wait, now)[1]
         low, high = float(energies_so_far.min()), float(energies_so_far.max())
-        level = f"the internal energy is {energy:.4g}, between {low:.4g} and {high:.4g} within one force-free time"
+        span = f"its highest value of the last {wait:.4g} ({low:.4g} to {high:.4g})"
         if energy >= low + _HIGH * (high - low):
-            message = f"switch now: {level}{_warn_of_swing(history, flight, now)}"
+            message = (
+                f"switch now: the internal energy, {energy:.4g}, is near {span}; it is not compared with the energy "
+                f"at td, which is unknown yet{_warn_of_swing(history, flight, now)}"
+            )
             yield Event("switch", now, now, message, wait, tr=now)
             return
         if now == flight.seen:
-            message = f"not yet: {level}; waiting until {last:.6g} for its maximum"
+            message = (
+                f"not yet: the internal energy, {energy:.4g}, is far below {span}; "
+                f"waiting until {last:.6g} for its maximum"
+            )
             yield Event("later", last, now, message, wait)
     if history.end > last < end:
         tr = highest_energy(history, flight.seen, last)

@@ -37,8 +37,8 @@ class Swing(NamedTuple):
         if self.at_most:
             motion, limit = "moves relative to the other, or both rotate", "at most"
         return (
-            f"{self.name} {motion}: at td the body may be out of place by {limit} {self.error:.3g},"
-            f" more than {MOST_OF_PATH:.0%} of its path in a flight shorter than {self.flight:.3g}"
+            f"{self.name} {motion}: at td the body may be out of place by {limit} {self.error:.3g}; "
+            f"this is less than {MOST_OF_PATH:.0%} of its path only in a flight longer than {self.flight:.3g}"
         )
 
 

@@ -6,6 +6,7 @@ takes 1 % of a processor core.
 
 from __future__ import annotations
 
+import shlex
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -34,6 +35,8 @@ _SHORTEST, _LONGEST = 0.5, 5.0
 # A run is reported as silent after this time without output [s].
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
+# Events that advise when to switch.
+_ADVICE: Final = ("switch", "later")
 _NO_EVIDENCE: Final = (
     "neither momenta nor the contact energy are written, so no force can be recognised; write them "
     "(Radioss: /TFILE and /TH/PART with DEF, MASS; LS-DYNA: *DATABASE_GLSTAT and _MATSUM)"
@@ -54,14 +57,21 @@ class Watch:
         wait: float | None = None,
         inventory: Inventory | None = None,
     ) -> None:
-        self._names = names
+        self._names, self._parts = names, selection.parts
         self.looks = Looks(selection, inventory, wait)
         self._files: dict[str, FileStamp] = {}
         self._events: tuple[Event, ...] = ()  # Events that have been reported.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
+        self._was_over = False  # True if the run seemed over at the first read.
         self.ended: str | None = None
+
+    @property
+    def _plan(self) -> str:
+        """Return the command that chooses the times of a finished run."""
+        parts = ("--part", ",".join(self._parts)) if self._parts else ()
+        return shlex.join(("d2rpick", "plan", *parts, *self._names))
 
     def news(self) -> Iterator[Event]:
         """Return the events since the last read; empty for a run that has not yet begun.
@@ -90,7 +100,11 @@ class Watch:
             raise self._error
         if silence > self._report_silence_after and not self.ended:
             self._report_silence_after = 2 * silence
-            yield self._make_event("silent", f"nothing was written for {silence:.0f} s")
+            message = (
+                f"nothing was written for {silence:.0f} s. If the run is over, choose times with {self._plan}; "
+                "d2rpick follow ends with Ctrl+C, or with --once or --for"
+            )
+            yield self._make_event("silent", message)
 
     def state(self) -> Event:
         """Return a sentence that states whether the parts are flying now, and since when."""
@@ -105,6 +119,8 @@ class Watch:
                 time, message = event.time, f"flies since {event.time:.6g}"
             elif event.event == "contact":
                 time, message = None, f"no flight since {event.time:.6g}"
+        if self._was_over:
+            message += f"; choose times with {self._plan}"
         now, evidence = self._last_time, self.looks.evidence
         wait = evidence.given or evidence.motion.longest(now)
         if time is None and wait is None:
@@ -125,8 +141,9 @@ class Watch:
         pairs = zip(self._events, events, strict=False)
         kept_count = sum(event == event_before for event, event_before in pairs)
         if before is None:
-            message = f"the run has reached {now:.6g}"
-            yield Event("begun", evidence.history.start, now, message)
+            yield Event(
+                "begun", evidence.history.start, now, self._describe_first_look(now)
+            )
         elif now < before or kept_count < len(self._events):
             message = (
                 f"the run was restarted: it was at {before:.6g} and is now at {now:.6g}"
@@ -134,11 +151,30 @@ class Watch:
             yield Event("restart", now, now, message)
             yield from _expect_contact(self._events[kept_count:], now)
         self._last_time, self._events = now, events
-        yield from events[kept_count:]
+        if before is None and self._was_over:
+            yield from map(_tell_as_past, events)
+        else:
+            yield from events[kept_count:]
+
+    def _describe_first_look(self, now: float) -> str:
+        """Report how far the run is at the first read; if it seems over, refer to ``plan``."""
+        reached = f"the run has reached {now:.6g}"
+        ending = _find_ending([*self._files][-1])
+        written = max(written for _, _, written in self._files.values())
+        silence = time.time() - written
+        if not ending and silence <= _SILENT:
+            return reached
+        self._was_over = True
+        reason = (
+            f"has ended {ending}"
+            if ending
+            else f"seems over: nothing was written for {silence:.0f} s"
+        )
+        return f"{reached} and {reason}; choose times with {self._plan}, because the events below are past"
 
     def _check_end(self, name: str) -> Iterator[Event]:
         """Report once that the run has ended, if the listing next to its last file shows this."""
-        self.ended = _PACKED if name.endswith(".gz") else find_ending(name)
+        self.ended = _find_ending(name)
         if self.ended:
             event = "failed" if self.ended == WITH_AN_ERROR else "ended"
             yield self._make_event(event, f"the run has ended {self.ended}")
@@ -146,6 +182,19 @@ class Watch:
     def _make_event(self, event: str, message: str) -> Event:
         """Return an event at the last state."""
         return Event(event, self._last_time, self._last_time, message)
+
+
+def _find_ending(name: str) -> str | None:
+    """Return how the run of a history has ended; None if it may still be computed."""
+    return _PACKED if name.endswith(".gz") else find_ending(name)
+
+
+def _tell_as_past(event: Event) -> Event:
+    """Return an event of a finished run, in which an advice cannot be followed any more."""
+    if event.event not in _ADVICE:
+        return event
+    message = f"during the run the advice was: {event.message}"
+    return event._replace(message=message)
 
 
 def _expect_contact(lost_events: Sequence[Event], now: float) -> Iterator[Event]:

@@ -21,7 +21,7 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import make_history, simulate
 from d2rpick.report.suggestion import list_alternatives
 from tests import paper
-from tests.command import ENERGY, ROLLOVER, run, run_json
+from tests.command import ENERGY, ROLLOVER, ROOT, join_wrapped_lines, run, run_json
 from tests.computed import locate_results
 from tests.energies import (
     count_fits,
@@ -121,6 +121,23 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
     )
     lines = dict(list_alternatives(suggestion))
     assert lines["longer"].startswith("a longer window exists (tr = ")
+
+
+def test_the_reason_against_a_longer_window_is_the_verdict_on_it() -> None:
+    """The residuals of both windows are printed as 0.000; only the longer one may hide a further mode."""
+    folder = ROOT / "sample_data/oscillator"
+    question = ("--part", "all", "--deck", str(folder / "OSC_0000.rad"))
+    history = str(folder / "OSCT01.gz")
+    longer = run_json("suggest", *question, history)["longer_pair"]
+    times = ("--tr", repr(longer["tr"]), "--td", repr(longer["td"]))
+    judged = run_json("verify", *times, *question, history)
+    text = join_wrapped_lines(run("plan", *question, history).stdout)
+    assert judged["verdict"] == "use with care"
+    assert (
+        f"but its verdict is 'use with care', because {judged['verdict_reason']}"
+        in text
+    )
+    assert "has residual 0.000" not in text
 
 
 @pytest.mark.slow

@@ -815,3 +815,11 @@ def test_without_a_history_no_window_has_a_verdict() -> None:
             None,
         ) * 3
     assert "use" not in run("check", DECK).stdout
+
+
+def test_the_step_after_a_check_explains_an_error_above_all_warnings() -> None:
+    """The finding of the earlier line is a warning."""
+    place("late.k", LATE.replace(THERE, "*DATABASE_GLSTAT\n      0.01\n" + THERE))
+    result = run("check", "late.k")
+    assert result.stdout.index("warning D2R") < result.stdout.index("error D2R101")
+    assert "d2rpick rule D2R101 explains the worst of them" in result.stdout

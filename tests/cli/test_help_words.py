@@ -107,3 +107,13 @@ def test_the_measures_find_what_they_are_for() -> None:
     assert BANNED.search("which the deck tells")
     assert not BANNED.search("which the deck defines")
     assert split_sentences("Time of td.  [default: 0]") == ["Time of td."]
+
+
+def test_no_help_shows_an_expression_of_python() -> None:
+    """Commands of a user may contain {deck} and {threads}; anything else in braces is a text that was not filled in."""
+    for name, text in list_options():
+        assert re.search(r"\{(?!(?:deck|threads)\})", text) is None, name
+    helps = dict(list_options())
+    assert (
+        "reference_m, published_m, better_m, or z_m, y_m" in helps["reproduce --solver"]
+    )

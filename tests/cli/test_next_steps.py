@@ -195,16 +195,66 @@ BOX_ONLY = ("--part", "box", MATSUM)
     ],
     ids=" ".join,
 )
-def test_the_next_command_can_be_typed_as_it_stands(arguments: tuple[str, ...]) -> None:
+def test_the_next_command_can_be_typed_as_it_stands(
+    arguments: tuple[str, ...], tmp_path: Path
+) -> None:
     text = find_line("next", *arguments)
     match = re.search(r"d2rpick (.*?)( \(|\. Then|$)", text)
     assert match, text
-    step = run(*shlex.split(match[1]))
+    # Only the user knows the main deck and the folder for its copy.
+    given = {"DECK": DECK, "switched": str(tmp_path / "switched")}
+    step = run(*(given.get(word, word) for word in shlex.split(match[1])))
     assert step.exit_code in (0, 1), step.stderr
     assert any(
         verdict in step.stdout.lower()
         for verdict in (*VERDICTS.values(), "written by d2rpick")
     )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("plan", *FLYING),
+        ("suggest", *FLYING),
+        ("explore", *FLYING),
+        ("verify", *WITH_CARE, MATSUM),
+    ],
+    ids=" ".join,
+)
+def test_the_shortest_way_to_a_card_of_connected_parts_merges_them(
+    arguments: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = find_line("next", *arguments)
+    assert "without it, parts that share nodes become separate rigid bodies" in text
+    match = re.search(r"d2rpick (.*?) \(", text)
+    assert match, text
+    folder = tmp_path / "switched"
+    given = {"DECK": DECK, "switched": str(folder)}
+    step = run(*(given.get(word, word) for word in shlex.split(match[1])))
+    written = [path.read_text() for path in folder.glob("*.k")]
+    card = "".join([step.stdout, *written])
+    assert "         2         1      PART\n" in card
+    assert "CHECK BEFORE USE" not in card
+
+
+def test_a_card_whose_parts_may_share_nodes_says_so_in_its_text() -> None:
+    times = ("--tr", "0.1", "--td", "0.2")
+    warning = "$ CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0)"
+    assert warning in run("card", *times, "--part", "1,2").stdout
+    assert warning in run("plan", "-q", "-f", "card", *FLYING).stdout
+    assert warning not in run("card", *times, "--part", "1").stdout
+    merged = run("card", *times, "--part", "1,2", "--merge", "1").stdout
+    assert warning not in merged
+
+
+def test_the_step_to_the_card_keeps_the_merged_part(tmp_path: Path) -> None:
+    for command in ("plan", "suggest", "verify"):
+        times = WITH_CARE[:4] if command == "verify" else ()
+        page = str(tmp_path / f"{command}.html")
+        merging = ("--merge", "1", "--report", page)
+        text = find_line("next", command, *times, *merging, *FLYING)
+        assert "--merge 1" in text
+        assert "DECK" not in text
 
 
 @pytest.mark.parametrize("text", ["suggest --td 0.37", "explore --td 0.37"])

@@ -244,6 +244,8 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
 
 def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
     """Otherwise `check` finds nodes that belong to two rigid bodies (D2R108)."""
+    output = "*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n*END"
+    deck = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", output))
     result = run(
         "plan",
         "-q",
@@ -251,7 +253,7 @@ def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) ->
         "recommended",
         "--write-deck",
         str(tmp_path / "next"),
-        *WITH_DECK,
+        *("--deck", str(deck), MATSUM),
     )
     assert result.exit_code == 0
     assert "0 errors, 0 warnings" in result.stdout

@@ -1,5 +1,6 @@
 """A run folder is enough input: its main deck is found, named and used, and cards are checked before printing."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -260,3 +261,30 @@ def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(
         "is new, for parts 1, 2" in result.stderr
     )  # one body, because they share nodes
     assert "card-objection" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    "keywords",
+    [
+        "",
+        DATABASES,
+        "*DATABASE_GLSTAT\n      0.01\n*DATABASE_MATSUM\n      0.01\n",
+    ],
+    ids=["no output", "fine output", "coarse output"],
+)
+def test_a_written_deck_has_the_findings_that_check_finds_in_it_without_a_history(
+    tmp_path: Path, keywords: str
+) -> None:
+    box = write_run_folder(tmp_path / "run", extra_keywords=keywords)
+    folder = tmp_path / "next"
+    command = ("plan", str(box), "--part", "flying", "--write-deck", str(folder))
+    written = run(*command).stdout
+    counted = re.search(r"\d+ errors?, \d+ warnings?", written)
+    assert counted
+    checked = run("check", str(folder / "main.k")).stdout
+    assert counted[0] in checked
+    assert ("D2R111" in written) == (keywords != DATABASES) == ("D2R111" in checked)
+    assert "no energy history to choose" not in written
+    assert ("after reading the warnings" in " ".join(written.split())) == (
+        keywords != DATABASES
+    )

@@ -9,7 +9,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.deck.radioss_run import read_run
-from tests.command import ROOT
+from tests.command import ROOT, run
 from tests.decks import pad, write
 from tests.sprung import write_cubes
 
@@ -56,6 +56,11 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     )
     assert prepared.wait == pytest.approx(PERIOD / 2, rel=1e-2)
     assert "springs" in prepared.reason
+    checked = run("check", prepared.files[0])
+    assert checked.exit_code == 0
+    assert "switches itself by forces or sensors of the run" in checked.stdout
+    assert "no switching cards" not in checked.stdout
+    assert f"d2rpick follow {tmp_path / 'next'} shows" in checked.stdout
     assert not any(
         "stays active" in note for note in prepared.notes
     )  # the body is deactivated, as in runs computed with OpenRadioss
@@ -178,6 +183,10 @@ def test_ls_dyna_gets_a_pair_of_switches_with_contact_codes(tmp_path: Path) -> N
         after=0.05,
     )
     main, switches = prepared.files
+    checked = run("check", main).stdout
+    assert "switches itself by forces or sensors of the run" in checked
+    assert "no switching cards" not in checked
+    assert "plan HISTORY" not in checked
     text = Path(switches).read_text()
     heads = [
         text.splitlines()[line_number + 2].split()

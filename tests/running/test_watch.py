@@ -11,7 +11,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.names import Selection
 from d2rpick.running.events import Event
 from d2rpick.running.watch import Watch, find_files, follow
-from tests.command import ROOT
+from tests.command import MATSUM, ROOT
 
 LEGS = [
     gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes())
@@ -153,3 +153,36 @@ def test_several_runs_in_a_folder_are_refused(folder: Path) -> None:
         (folder / name).write_bytes(LEGS[0])
     with pytest.raises(D2RPickError, match="several runs"):
         watch_to_end(folder)
+
+
+@pytest.mark.parametrize("how", ["listing", "age", "growing"])
+def test_a_run_that_is_over_when_first_seen_is_left_to_plan(
+    folder: Path, how: str
+) -> None:
+    """An advice to switch now would come too late, and plan knows the whole flight."""
+    history = folder / "matsum"
+    history.write_bytes(Path(MATSUM).read_bytes())
+    if how == "listing":
+        (folder / "messag").write_text(" N o r m a l    t e r m i n a t i o n\n")
+    if how == "age":
+        long_ago = time.time() - 3600
+        os.utime(history, (long_ago, long_ago))
+    events = watch_to_end(folder)
+    is_over = how != "growing"
+    command = f"choose times with d2rpick plan {folder}"
+    assert (command in events[0].message) == is_over
+    assert (command in events[-1].message) == is_over
+    advice = [event for event in events if event.event in ("switch", "later")]
+    assert advice
+    for event in advice:
+        assert event.message.startswith("during the run the advice was") == is_over
+
+
+def test_silence_names_what_ends_the_watch(folder: Path) -> None:
+    history = folder / "runT01"
+    history.write_bytes(LEGS[0])
+    long_ago = time.time() - 3600
+    os.utime(history, (long_ago, long_ago))
+    (silent,) = [event for event in watch_to_end(folder) if event.event == "silent"]
+    assert "Ctrl+C" in silent.message
+    assert "d2rpick plan" in silent.message
