@@ -334,7 +334,9 @@ def _list_step_without_window(
     assert answer is not None
     better = answer.decision.better if answer.decision else None
     otherwise = f"compare all td with {write_command(question, 'explore')}"
-    step = name_step_after_refusal(answer.situation, better, question, otherwise)
+    step = name_step_after_refusal(
+        answer.situation, better, question, otherwise, answer.decision
+    )
     return [("next", step)]
 
 

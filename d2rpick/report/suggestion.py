@@ -262,7 +262,9 @@ def _name_step_after_refusal(
     else:
         line = write_command(question, "explore", *question.times)
         otherwise = f"compare other td with {line}"
-    return name_step_after_refusal(answer.situation, better, question, otherwise)
+    return name_step_after_refusal(
+        answer.situation, better, question, otherwise, decision
+    )
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:

@@ -134,7 +134,7 @@ def list_next_step(
     elif decision.verdict == DO_NOT_USE:
         otherwise = f"compare all flights with {write_command(question, 'plan')}"
         step = name_step_after_refusal(
-            offer.answer.situation, decision.better, question, otherwise
+            offer.answer.situation, decision.better, question, otherwise, decision
         )
     else:
         times = ("--td", f"{offer.td:.6g}")

@@ -115,7 +115,11 @@ def list_next_step(
     if decision.verdict == DO_NOT_USE:
         line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
         step = name_step_after_refusal(
-            situation, decision.better, question, f"compare other td with {line}"
+            situation,
+            decision.better,
+            question,
+            f"compare other td with {line}",
+            decision,
         )
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")

@@ -252,3 +252,40 @@ def test_a_deck_that_already_switches_its_parts_is_named(tmp_path: Path) -> None
     text = run("plan", "--part", "1,2", "--deck", deck, MATSUM).stderr
     assert "the deck already switches parts with *DEFORMABLE_TO_RIGID_AUTOMATIC" in text
     assert "remove its switching cards" in text
+
+
+EXCEL = str(SAMPLES / "rollover_box_excel.csv")
+
+
+@pytest.mark.parametrize("options", [(), ("--deck", DECK)])
+@pytest.mark.parametrize("command", ["suggest", "explore"])
+def test_a_missing_mass_is_named_and_no_deck_is_asked_for(
+    command: str, options: tuple[str, ...]
+) -> None:
+    question = (command, "--td", "369.631", *options, EXCEL)
+    assert "do not contain the mass" in find_line("why", *question)
+    cure = find_line("to improve", *question)
+    assert cure.startswith("write the mass")
+    assert "--deck" not in cure
+    # The other commands have the same verdict, so that the step leads to a better record rather than round in a circle.
+    step = find_line("next", *question)
+    assert step.startswith("improve the record")
+    assert step.endswith(shlex.join(["suggest", "--td", "369.631", *options, EXCEL]))
+
+
+def test_the_mass_that_was_asked_for_helps(tmp_path: Path) -> None:
+    head, *rows = Path(EXCEL).read_text().splitlines()
+    table = tmp_path / "with_mass.csv"
+    table.write_text("\n".join([f"{head};Mass", *(f"{row};356" for row in rows)]))
+    assert run_json("suggest", EXCEL)["verdict"] == "do not use"
+    assert run_json("suggest", str(table))["verdict"] == "use with care"
+
+
+def test_the_step_to_a_better_record_keeps_a_window_for_td() -> None:
+    question = ("suggest", "--td-window", "340.5", "370.5", EXCEL)
+    assert find_line("next", *question).endswith(shlex.join(question))
+
+
+def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
+    text = run("plan", EXCEL).stdout
+    assert "next  improve the record as said above" in text

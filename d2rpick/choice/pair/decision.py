@@ -87,6 +87,12 @@ class Decision(NamedTuple):
         """The verdict in words: "use", "use with care" or "do not use"."""
         return VERDICTS[self.grade]
 
+    @property
+    def needs_better_record(self) -> bool:
+        """True if the pair cannot be used for a cause that holds for each pair of the record."""
+        causes = self.quality.causes
+        return self.grade == POOR and any(cause.is_of_record for cause in causes)
+
     def reaches(self, grade: str) -> bool:
         """Return True if the pair has at least the given grade."""
         return GRADES.index(self.grade) >= GRADES.index(grade)
