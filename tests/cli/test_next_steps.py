@@ -289,3 +289,24 @@ def test_the_step_to_a_better_record_keeps_a_window_for_td() -> None:
 def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
     text = run("plan", EXCEL).stdout
     assert "next  improve the record as said above" in text
+
+
+# verify blames what is to blame.
+
+
+def test_verify_blames_a_wrong_tr_with_one_error() -> None:
+    reason = find_line("why", "verify", "--tr", "0.02", "--td", "0.064", ENERGY)
+    assert "285%, because tr does not match td" in reason
+    assert "the energy at tr is 106 times that at td" in reason
+    # The best tr of suggest has this error.
+    best = run_json("suggest", "--td", "0.064", ENERGY)["candidates"][0]["residual"]
+    assert reason.endswith(f"the best tr at this td is wrong by {best:.0%}")
+    assert "frozen-deformation error" not in reason
+    assert "hides a further mode" not in reason
+
+
+def test_verify_blames_td_if_tr_is_the_best_for_it() -> None:
+    tr = run_json("suggest", "--td", "0.064", ENERGY)["recommended"]["tr"]
+    reason = find_line("why", "verify", "--tr", str(tr), "--td", "0.064", ENERGY)
+    assert "kinetic at td, which no tr can keep" in reason
+    assert "tr does not match" not in reason

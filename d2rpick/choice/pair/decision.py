@@ -102,6 +102,9 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
+        if self.grade == POOR and self.quality.grade != POOR:
+            # The error makes the pair inadmissible, however little it matters in the next contact.
+            return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
         reasons = "; ".join(self.quality.reasons)
@@ -116,6 +119,9 @@ class Decision(NamedTuple):
         """Reason for a verdict other than "use", without numbers, so that several pairs can share it."""
         if self.objections:
             return "; ".join(self.objections)
+        if self.grade == POOR and self.quality.grade != POOR:
+            causes = self.quality.alone.causes
+            return "; ".join(cause.general_reason for cause in causes)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
         if self.is_limited_by_raised_grade:
             limit = (
@@ -187,15 +193,19 @@ def decide(
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
+    is_admissible: bool = True,
+    best_residual: float | None = None,
 ) -> Decision:
     """Decide on a tr in a situation. Any of the ``objections`` makes it inadmissible; ``better`` is a better pair.
 
-    If there is no better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of
-    which the pair is the best [time], if all were compared.
+    ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
+    ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
+    better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which the pair is
+    the best [time], if all were compared.
     """
-    quality = grade_pair(situation, candidate)
+    quality = grade_pair(situation, candidate, best_residual)
     return Decision(
-        grade=POOR if objections else quality.grade,
+        grade=quality.grade if is_admissible and not objections else POOR,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,

@@ -372,8 +372,13 @@ def _explain_unknown_load(situation: Situation) -> Cause:
     return _UNKNOWN_LOAD if history.surroundings is UNKNOWN else _UNKNOWN_LOAD_WITH_DECK
 
 
-def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade a recommended tr by its motion, by its vibration error, and by that error relative to the next contact."""
+def grade_pair(
+    situation: Situation, best: Candidate, best_residual: float | None = None
+) -> Quality:
+    """Grade a tr by its motion, by its vibration error, and by that error relative to the next contact.
+
+    ``best_residual`` is that of the best tr at this td [-], None if it is unknown or if this is the best tr.
+    """
     flight = situation.flight
     uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)
@@ -390,7 +395,8 @@ def grade_pair(situation: Situation, best: Candidate) -> Quality:
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(
-        _list_causes_for_poor(situation, best), _list_causes_for_fair(situation, best)
+        _list_causes_for_poor(situation, best, best_residual),
+        _list_causes_for_fair(situation, best),
     )
     worth = compare_error_with_contact(situation, best)
     counted = (
@@ -410,13 +416,16 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     return Grade("fair", alone.causes)
 
 
-def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
+def _list_causes_for_poor(
+    situation: Situation, best: Candidate, best_residual: float | None
+) -> list[Cause]:
     """Return the causes for which the vibration is graded "poor"."""
     causes = []
     if best.residual is None:
         causes.append(_describe_unknown_direction(situation))
     elif best.residual > POOR_RESIDUAL:
-        causes.append(_describe_wrong_vibration(situation, best.residual))
+        wrong = _describe_wrong_tr(best, best.residual, best_residual)
+        causes.append(wrong or _describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
         causes += _list_causes_of_record(
             situation.history, situation.flight.start, situation.td
@@ -497,6 +506,27 @@ def _describe_cure_for_modes(situation: Situation) -> str:
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
     return _MORE_OFTEN
+
+
+def _describe_wrong_tr(
+    candidate: Candidate, residual: float, best_residual: float | None
+) -> Cause | None:
+    """Return the cause "tr does not match td" if the best tr at this td is clearly better; otherwise None."""
+    if best_residual is None or residual - best_residual <= EQUALLY_GOOD:
+        return None
+    reason = f"the vibration after td is wrong by {residual:.0%}, because tr does not match td"
+    ratio = candidate.level_ratio
+    if ratio is not None and abs(ratio - 1) > LIKE_LEVELS:
+        reason += f": the energy at tr is {ratio:.3g} times that at td"
+    elif candidate.sign_match is False:
+        reason += ": the deformation has the opposite direction"
+    best = f"the best tr at this td is wrong by {best_residual:.0%}"
+    return Cause(
+        f"{reason}; {best}",
+        "use d2rpick suggest with this td to find a better tr",
+        needs_other_times=True,
+        kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}, because tr does not match td",
+    )
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:

@@ -476,11 +476,13 @@ class Objection(NamedTuple):
     """An objection to all candidates for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
-    this module with some of its arguments.
+    this module with some of its arguments.  ``is_of_error``: it only says that an error is too large, as the residual
+    does.
     """
 
     holds: NDArray[np.bool_]
     describe: Callable[[int], Iterable[str]]
+    is_of_error: bool = False
 
 
 def list_objections(
@@ -541,11 +543,14 @@ def list_objections(
         ("level error", ~compared),
     ):
         yield Objection(
-            too_much & ~modal & of_this_name, partial(_tell_error, name, error, limits)
+            too_much & ~modal & of_this_name,
+            partial(_tell_error, name, error, limits),
+            is_of_error=True,
         )
     yield Objection(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
+        is_of_error=True,
     )
     # If td lies after the end of the flight, the energy in the flight does not predict the motion after td.
     means = [
@@ -564,7 +569,9 @@ def list_objections(
             )[situation_of]
         )
         yield Objection(
-            is_above, partial(_tell_above_the_reference, means, situation_of, energy)
+            is_above,
+            partial(_tell_above_the_reference, means, situation_of, energy),
+            is_of_error=True,
         )
 
 
