@@ -683,7 +683,13 @@ def _refuse_switched(situation: Situation) -> None:
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
     """Add to the answer for a given td what the search of its flight finds if the pair is not good."""
     best, decision = answer.chosen, answer.decision
-    if best is None or decision is None or decision.better:
+    if best is None:
+        choice = _choose_in_flight(answer.situation)
+        is_usable = choice and choice.decision and choice.decision.grade != POOR
+        if choice and is_usable:
+            return replace(answer, better_pair=choice.recommended)
+        return answer
+    if decision is None or decision.better:
         return answer
     decision = compare_in_flight(decision, answer.situation, best)
     if decision.better:

@@ -78,6 +78,12 @@ def name_step_to_card(
     return f"print the cards with {line}{hint}"
 
 
+def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
+    """Return the step that judges a better pair."""
+    line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
+    return f"judge the better pair with {line}"
+
+
 def _keep_td(times: Sequence[str]) -> Sequence[str]:
     """Return the words of ``--td`` or ``--td-window`` among those of the times; empty without either."""
     for name, values in (("--td", 1), ("--td-window", 2)):
@@ -101,9 +107,11 @@ def name_step_after_refusal(
     if decision is not None and decision.needs_better_record:
         line = write_command(question, "suggest", *_keep_td(question.times))
         return f"improve the record as said above, then judge it again with {line}"
+    if decision is not None and decision.is_outside_flight and better is None:
+        line = write_command(question, "suggest")
+        return f"choose both times in the flight with {line}"
     if better is not None:
-        line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
-        return f"judge the better pair with {line}"
+        return name_step_to_better_pair(better, question)
     missing = situation.together.not_chosen.parts if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)

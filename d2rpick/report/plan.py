@@ -249,7 +249,9 @@ def give_plan_sentence(plan: RunPlan) -> str:
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    text = f"{_describe_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    use = _describe_use(plan)
+    make = "planned nevertheless (--min-quality): " if use.endswith(DO_NOT_USE) else ""
+    text = f"{use}: {make}make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:

@@ -18,6 +18,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     name_step_after_refusal,
+    name_step_to_better_pair,
     name_step_to_card,
     write_command,
 )
@@ -125,6 +126,8 @@ def list_next_step(
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
         step = f"use the results of the switched run; keep the comparison with {line}"
+    elif decision.better is not None:
+        step = name_step_to_better_pair(decision.better, question)
     else:
         step = name_step_to_card(
             situation.history,

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import bound_mean_energy
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR, grade_pair
+from d2rpick.choice.pair.quality import (
+    CHOOSE_TIMES_IN_FLIGHT,
+    MOST_WORTH_OF_FAIR,
+    grade_pair,
+)
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
@@ -93,6 +97,13 @@ class Decision(NamedTuple):
         causes = self.quality.causes
         return self.grade == POOR and any(cause.is_of_record for cause in causes)
 
+    @property
+    def is_outside_flight(self) -> bool:
+        """True if tr or td lies outside the flight."""
+        return any(
+            cause.cure == CHOOSE_TIMES_IN_FLIGHT for cause in self.quality.motion.causes
+        )
+
     def reaches(self, grade: str) -> bool:
         """Return True if the pair has at least the given grade."""
         return GRADES.index(self.grade) >= GRADES.index(grade)
@@ -170,10 +181,11 @@ class Decision(NamedTuple):
             return ""
         if self.better is not None:
             return f"use {_describe_pair(self.better)}"
+        if self.is_outside_flight and not self.is_compared:
+            return CHOOSE_TIMES_IN_FLIGHT
         if self.objections or not self.quality.causes:
             return self.cure_of_objections
-        cures = dict.fromkeys(map(self.specify_cure, self.quality.causes))
-        return "; ".join(cures)
+        return join_cures(map(self.specify_cure, self.quality.causes))
 
     def specify_cure(self, cause: Cause) -> str:
         """Return the advice that removes a cause; other times are not advised if the pair is the best of a td range."""
@@ -183,6 +195,22 @@ class Decision(NamedTuple):
         usable = _USE_COMPARED if self.is_compared else _USE_BEST
         advice = _AVOID_BEST if self.grade == POOR else usable
         return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
+
+
+def join_cures(cures: Iterable[str]) -> str:
+    """Join cures, each once and without those that another one begins with.
+
+    Examples
+    --------
+    >>> join_cures(["write more often", "write more often, with more digits", "give the deck"])
+    'write more often, with more digits; give the deck'
+    """
+    listed = [*dict.fromkeys(cures)]
+    return "; ".join(
+        cure
+        for cure in listed
+        if not any(other != cure and other.startswith(cure) for other in listed)
+    )
 
 
 def decide(

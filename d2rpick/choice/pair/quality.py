@@ -65,7 +65,7 @@ _FEW_STATES: Final = 20
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
-_CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
+CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 # End of the advice on a pair; it is omitted if the finished switched run is already available.
 _OR_COMPARE: Final = ", or compare with a finished switched run"
@@ -269,6 +269,10 @@ _CHECK_GIVEN_TIMES: Final = (
     "make sure that no force acts in the flight that you gave, "
     "or let the evidence decide, without `after` and `landing`"
 )
+_UNKNOWN_OUTSIDE: Final = Cause(
+    "the error of the vibration is unknown, because tr or td lies outside the flight",
+    CHOOSE_TIMES_IN_FLIGHT,
+)
 _UNKNOWN_MASS: Final = Cause(
     "the files do not contain the mass, so it is unknown whether gravity or another load changes the momentum in the "
     "flight",
@@ -383,7 +387,7 @@ def grade_pair(
     uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
-        *(Cause(fault, _CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
+        *(Cause(fault, CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
         *(
             Cause(fault, _CORRECT_THE_DECK, is_of_record=True)
             for fault in situation.settings.ruined
@@ -422,7 +426,10 @@ def _list_causes_for_poor(
     """Return the causes for which the vibration is graded "poor"."""
     causes = []
     if best.residual is None:
-        causes.append(_describe_unknown_direction(situation))
+        if list_times_outside_flight(situation, best.tr):
+            causes.append(_UNKNOWN_OUTSIDE)
+        else:
+            causes.append(_describe_unknown_direction(situation))
     elif best.residual > POOR_RESIDUAL:
         wrong = _describe_wrong_tr(best, best.residual, best_residual)
         causes.append(wrong or _describe_wrong_vibration(situation, best.residual))

@@ -526,7 +526,9 @@ def list_objections(
     ]
     same_sign = (columns["sign_match"] != 0) | modal
     yield Objection(
-        moves & ~described, partial(_tell_undescribed, situations, situation_of)
+        # Before the flight no model is expected to describe the vibration, so that is no second objection.
+        moves & ~described & ~is_early,
+        partial(_tell_undescribed, situations, situation_of),
     )
     yield Objection(
         moves & ~same_sign,
@@ -586,7 +588,7 @@ def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
     """Return descriptions of the times of a pair that lie outside the flight or less than the margin before its end."""
     outside = []
     if tr < _get_first_tr(situation):
-        outside.append(f"tr {_describe_in_load(situation)}")
+        outside.append(_describe_in_load(situation))
     if situation.td > situation.latest_td:
         outside.append(f"td after {describe_end_of_flight(situation)}")
     return outside
@@ -656,7 +658,7 @@ def _describe_in_load(situation: Situation) -> str:
     """State that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: no end of the load is found"
-    return f"before {describe_end_of_load(situation)}"
+    return f"tr before {describe_end_of_load(situation)}"
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
