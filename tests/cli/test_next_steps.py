@@ -389,6 +389,13 @@ def test_the_next_study_leaves_out_what_cannot_be_read(tmp_path: Path) -> None:
     assert "broken.csv" not in step
 
 
+@pytest.mark.parametrize("command", ["suggest", "explore", "plan"])
+def test_a_tr_that_is_given_leads_to_verify(command: str) -> None:
+    refused = run(command, "--tr", "0.01", ENERGY)
+    assert refused.exit_code == 2
+    assert "d2rpick verify judges a given tr" in refused.stderr
+
+
 def test_a_cure_is_given_once() -> None:
     times = ("--tr", "0.0001", "--td", "0.1", "--part", "all")
     text = run("verify", *times, str(SAMPLES / "oscillator" / "OSCT01.gz")).stdout
