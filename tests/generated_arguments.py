@@ -14,7 +14,7 @@ from d2rpick.choice.options import ChoiceOptions, list_uses
 from tests.command import ROOT
 
 MODULE = ROOT / "d2rpick" / "api" / "choosing.py"
-HEAD = '''"""Define the keyword arguments by which pairs are chosen and judged.
+HEAD = '''"""Define the keyword arguments that determine how pairs are chosen and judged.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """
@@ -88,13 +88,14 @@ def write_module() -> str:
     others = tuple(name for name in list_uses() if name not in of_cards)
     judging = write_class(
         "JudgingOptions(TypedDict, total=False)",
-        "Options that say how a pair is judged.  None stands for the default.\n\n"
+        "Options that determine how a pair is judged.  None stands for the default.\n\n"
         '    Times have the unit of the history, or are strings with a unit, such as ``"64ms"``.',
         list_arguments(of_cards),
     )
     choosing = write_class(
         "Choosing(JudgingOptions, total=False)",
-        "Options that say how pairs are chosen and judged, as in ``d2rpick suggest``.  None stands for the default.",
+        "Options that determine how pairs are chosen and judged, as in ``d2rpick suggest``.  "
+        "None stands for the default.",
         list_arguments(others) | OF_PYTHON,
     )
     return "\n".join([HEAD.rstrip("\n"), *judging, *choosing, ""])

@@ -44,13 +44,13 @@ class Answer:
             """The command line that gives the same answer; it begins with the name of the command."""
 
     cautions: tuple[Caution, ...]
-    kind: ClassVar[str]  # Name of the kind of answer in the table of output forms.
-    # Names of the attributes that the short form of the answer shows.
+    kind: ClassVar[str]  # Key of this type of answer in the table of output formats.
+    # Names of the attributes that ``repr`` of the answer shows.
     said: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def of(cls, result: Any, **further_fields: Any) -> Self:
-        """Make the public answer from a result of the core; ``cautions`` are appended to the cautions of the result."""
+        """Make the public answer from an internal result; ``cautions`` are appended to the cautions of the result."""
         values = {field.name: getattr(result, field.name) for field in fields(result)}
         values["cautions"] = (*values["cautions"], *further_fields.pop("cautions", ()))
         return cls(**values, **further_fields)
@@ -75,13 +75,13 @@ class Answer:
         return self.cautions
 
     def text(self, form: str, display: DisplayOptions) -> str:
-        """Return the answer as text in one of the output forms of the command line."""
+        """Return the answer as text in one of the output formats of the command line."""
         from d2rpick.report.formats import write
 
         return write(self.kind, form, self, display)
 
     def to_json(self) -> str:
-        """Return the JSON document that the command line prints; it names its schema."""
+        """Return the JSON document that the command line prints; it contains the name of its schema."""
         from d2rpick.api.option_names import replace_arguments
         from d2rpick.report.formats import DisplayOptions
 
@@ -160,7 +160,7 @@ class RunAnswer(Paged):
     def about(
         cls, question: RunQuestion, result: Any, *times: str, **further_fields: Any
     ) -> Self:
-        """Make the public answer from a question and the result of the core, with the cautions of the question."""
+        """Make the public answer from an internal result, and add the cautions that the question raised."""
         return cls.of(
             result,
             cautions=question.cautions,
@@ -177,7 +177,7 @@ class RunAnswer(Paged):
         chosen: tuple[Situation, float] | None,
         explored: TradeOff | None,
     ) -> PageContext:
-        """Return what a page shows in addition to the answer, such as the card for the chosen situation and tr."""
+        """Return what a page shows in addition to the answer, including the card for the chosen situation and tr."""
         from d2rpick.report.page import PageContext
 
         context = PageContext(
@@ -210,7 +210,7 @@ class RunAnswer(Paged):
         return context._replace(card=card)
 
     def _explorer(self, trade_offs_or_none: Iterable[TradeOff | None]) -> Any:
-        """Return the interactive data of a page, and the command line that gives the answer for a td."""
+        """Return the interactive data of a page, and the command line that repeats the answer for any td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(trade_off for trade_off in trade_offs_or_none if trade_off)
@@ -222,7 +222,7 @@ class RunAnswer(Paged):
 
 
 def write_page(path: arguments.Path, page: str) -> Path:
-    """Write a page and return its path."""
+    """Write a page to a file and return the path of the file."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     from d2rpick.api import arguments

@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
-    # False means that no deck is used, even if the folder of the run contains one.
+    # False means that no deck is used, even if there is one in the folder of the run.
     Deck = Path | Literal[False]
     Parts = str | int | Iterable[str | int]
-    # A number in the unit of the run, or a string with a unit, such as 64ms.
+    # A number in the unit of the run, or a string with a unit, for example 64ms.
     Time = float | str
 
-# Largest number of characters of a wrong value that a message shows.
+# Largest number of characters of a wrong value that are shown in a message.
 _LONGEST_SHOWN: Final = 60
 
 
 def check_number(name: str, value: object, limits: Number = TIME) -> float:
-    """Return a finite number within its limits; raise TypeError or ValueError for anything else.
+    """Return a finite number within its limits; raise TypeError or ValueError for any other value.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def check_number(name: str, value: object, limits: Number = TIME) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Return True for a number of Python or numpy, also in a 0-dimensional array; False for True, text or complex."""
+    """Return True for a Python or numpy number, also in a 0-dimensional array; False for True, text or complex."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
     if (
         isinstance(value, bool | str | bytes)
@@ -68,7 +68,7 @@ def is_number(value: object) -> bool:
 
 
 def is_whole_number(value: object) -> bool:
-    """Return True for a whole number of Python or numpy; False for True, text or a float."""
+    """Return True for a Python or numpy whole number; False for True, text or a float."""
     return (
         is_number(value)
         and hasattr(value, "__index__")
@@ -77,7 +77,7 @@ def is_whole_number(value: object) -> bool:
 
 
 def _format_wrong_value(value: object) -> str:
-    """Return a wrong value as one line of limited length."""
+    """Return a wrong value as a single line of limited length."""
     text = " ".join(repr(value).split())
     if len(text) <= _LONGEST_SHOWN:
         return text
@@ -126,7 +126,7 @@ def check_windows(name: str, value: object) -> list[tuple[float, float]]:
 
 
 def suggest_decimal_point(value: object) -> str:
-    """Explain how to write a number that was given with a decimal comma; empty for other strings.
+    """Explain how to write a number that was given with a decimal comma; return an empty string for other strings.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def suggest_decimal_point(value: object) -> str:
 
 
 def suggest_without_unit(value: object) -> str:
-    """Explain how to write a time that was given with a unit; empty for other strings."""
+    """Explain how to write a time that was given with a unit; return an empty string for other strings."""
     from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
@@ -155,7 +155,7 @@ def suggest_without_unit(value: object) -> str:
 
 
 def suggest_without_percent(value: object, *, is_time: bool) -> str:
-    """Explain how to write a fraction, or a time, that was given in percent; empty for other strings.
+    """Explain how to write a fraction or a time that was given in percent; return an empty string for other strings.
 
     Examples
     --------
@@ -339,7 +339,7 @@ def refuse_unknown(
 
 
 def check_option(name: str, value: object, option: Option, default: Any = None) -> Any:
-    """Return a value converted to the kind of its option, or the default for None.
+    """Return a value converted to the type of its option, or the default for None.
 
     Examples
     --------
@@ -372,7 +372,7 @@ def check_option(name: str, value: object, option: Option, default: Any = None) 
 
 
 def read_choosing(choosing: Choosing | Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a request that determine how the times are chosen."""
+    """Return the request fields that determine how the times are chosen."""
     from d2rpick.api.choosing import Choosing as Arguments
 
     expected_names = Arguments.__annotations__
@@ -456,7 +456,7 @@ def check_path(name: str, value: Path) -> str:
 
 
 def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
-    """Read windows from the output of ``d2rpick plan -f value`` (a line ``tr td`` for each window).
+    """Read windows from the output of ``d2rpick plan -f value``, which has a line ``tr td`` for each window.
 
     The journal of a driven run is accepted too.
 
@@ -490,10 +490,10 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _read_journal(text: str) -> list[tuple[float, float]]:
-    """Return the windows of the rigid restart segments in a journal; of equal segment numbers, the last is used."""
+    """Return the windows of the rigid restart segments in a journal; the last entry of each segment number is used."""
     import json  # Imported here to keep start-up fast.
 
-    # Each segment consists of its number, True if it is rigid, its start and its end.
+    # Each item is a restart segment: its number, True if it is rigid, its start and its end.
     legs: list[tuple[int, bool, float, float]] = []
     for line in text.splitlines():
         try:

@@ -1,4 +1,4 @@
-"""Turn a request into a question: open the run, complete the settings from the deck, select the energy, add the cost.
+"""Turn a request into a question: open the run, select the energy, and add the settings and costs from the deck.
 
 The commands of one run and the Python functions use this; `d2rpick.choice.answers` computes the answer.
 """
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class RunQuestion(NamedTuple):
-    """A question: the opened run, the selected energy, and the settings by which the run is judged.
+    """A question: the opened run, the selected energy, and the settings that determine how the run is judged.
 
     ``cautions`` name what the deck leaves unknown.  ``selection`` has the columns and parts, including those from the
     deck.  ``on_card`` are parts that only the card contains.
@@ -50,7 +50,7 @@ class RunQuestion(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    # False if the deck was found to belong to another run.
+    # False if the deck belongs to another run.
     of_this_run: bool = True
 
     @property
@@ -60,14 +60,14 @@ class RunQuestion(NamedTuple):
 
     @property
     def unused_deck(self) -> str | None:
-        """The deck that the user named, if it is not used because it belongs to another model; otherwise None."""
+        """The deck that the user named but that is not used because it belongs to another model; otherwise None."""
         if self.of_this_run or self.request.deck_in_folder:
             return None
         return self.request.deck
 
     @property
     def repeated(self) -> RepeatedQuestion:
-        """Words of the command line with which other commands ask about the same run."""
+        """Parts of the command line with which other commands ask about the same run."""
         if self.unused_deck:
             question = self.request.repeat(without=("deck", "weights", "step_ratio"))
             return question._replace(
@@ -78,7 +78,7 @@ class RunQuestion(NamedTuple):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Options that follow the times in the command line that repeats the question."""
+        """Options that follow the times on the command line that repeats the question."""
         # Imported here to keep start-up fast.
         from d2rpick.report.tables import make_positional
 
@@ -132,14 +132,14 @@ def open_requested_run(request: Request, names: Sequence[str] = ()) -> Run:
 
 
 def is_card_only(request: Request, run: histories.OpenedRun) -> bool:
-    """Return True if ``--part`` applies only to the card, because the history is a table without parts."""
+    """Return True if ``--part`` applies to the card only, because the history is a table without parts."""
     return bool(request.energy) or not run.parts
 
 
 def ask_run(
     run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
 ) -> RunQuestion:
-    """Select the requested energy of a run, and add the data from its deck.
+    """Select the requested energy of a run, and add the data from the run's deck.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def ask_run(
 
 
 def read_cost_model(request: Request) -> CostModel | None:
-    """Read the deck with its weights, or only the weights; None if neither is requested.
+    """Read the deck with its weights, or the weights alone; None if neither is requested.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def read_cost_model(request: Request) -> CostModel | None:
 def complete_selection(
     run: histories.OpenedRun, selection: Selection, settings: Settings, model: CostModel
 ) -> Selection:
-    """Complete a selection of parts with the recommended set, and with those springs of the deck that have energies.
+    """Complete the selected parts with the recommended set, and with the springs of the deck that have energies.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _check_recommended(request: Request, run: histories.OpenedRun) -> None:
 
 
 def _merge_parts(question: RunQuestion, merge: int) -> RunQuestion:
-    """Make the parts one rigid body; add a caution if they are not connected."""
+    """Treat the parts as one rigid body; add a caution if they are not connected."""
     from d2rpick.choice.parts.deck_of_run import merge_into_one_body
 
     parts = question.reference.history.parts

@@ -1,4 +1,4 @@
-"""Check a card in the deck of its run before the user pastes it there."""
+"""Check a card within the deck of its run before the user pastes it there."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNJOINED: Final = "parts-not-joined"
 def collect_objections(
     card: PrintedCard, question: RunQuestion, parts: int
 ) -> Iterator[Caution]:
-    """Yield the findings of ``check`` for a deck with the card; without a deck, name what is unknown.
+    """Yield the findings of ``check`` for the deck with the card; if there is no deck, state what remains unknown.
 
     ``parts`` is the number of parts that the card switches by their ids.
     """

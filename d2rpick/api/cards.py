@@ -64,11 +64,11 @@ class CardOptions(TypedDict, total=False):
 if TYPE_CHECKING:
 
     class Judging(CardOptions, JudgingOptions, total=False):
-        """Options of a card, and the options by which its windows are judged."""
+        """Options of a card, together with the options that determine how its windows are judged."""
 
 
 def _check_option(name: str, value: Any, option: Option) -> Any:
-    """Return a value converted to the kind of its option. Only the code that prints cards knows the solvers."""
+    """Return a value converted to the type of its option. Only the code that prints cards knows the solvers."""
     from d2rpick.api import arguments
 
     if option.kind == "solver":
@@ -84,7 +84,7 @@ def list_solvers() -> Sequence[str]:
 
 
 def explain_unknown_solver(name: object) -> str:
-    """Return the message about a name that is not a solver; the message suggests the most similar name."""
+    """Return the message about a name that is not a solver, with the most similar solver name."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
@@ -94,7 +94,7 @@ def explain_unknown_solver(name: object) -> str:
 
 @dataclass(eq=False, repr=False)
 class Cards:
-    """Options of a card, which all commands that print a card share."""
+    """Options that are common to all commands that print a card."""
 
     solver: str | None = make_option(
         "Solver whose input is printed.  [default: solver that wrote the history, else ls-dyna]",
@@ -165,7 +165,7 @@ class Cards:
         ]
 
     def replace_in(self, printing: Printing, parts: Sequence[int]) -> Printing:
-        """Return the options of the card, completed by the parts to switch if these are given."""
+        """Return the options of the card, with the parts to switch if any are given."""
         values = {name: getattr(self, name) for name in self.given}
         if self.node:
             values["node"] = tuple(parse_id_ranges("--node", self.node))
@@ -173,7 +173,7 @@ class Cards:
         return printing._replace(solver=solver, part=tuple(parts), **values)
 
     def check_solver(self, solver: str) -> None:
-        """Refuse options that the input of ``solver`` cannot express."""
+        """Refuse options that have no equivalent in the input of ``solver``."""
         from d2rpick.deck.printing import SOLVERS
 
         options_by_solver = {
@@ -194,7 +194,7 @@ class Cards:
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def complete(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Complete the options of a card that are not given from the deck of the run.
+        """Complete the options of a card with values from the deck of the run.
 
         Notes say which rigid bodies the deck lacks.
 
@@ -215,7 +215,7 @@ class Cards:
         return printing, notes
 
     def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, and notes on bodies that the deck lacks.
+        """Return what the deck of the run requires of a card, and notes on rigid bodies that are missing from the deck.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -256,12 +256,12 @@ class Cards:
         ), bodies.notes
 
 
-# Keys of the settings that apply to all commands; any other key applies to the rules, or to one command.
+# Keys of the settings that apply to all commands; all other keys apply to the rules or to a single command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
 def name_needed_argument(solver: Module) -> str:
-    """Return the name of the argument that lists the parts or bodies on a card of ``solver``."""
+    """Return a message that names the argument with the parts or bodies on a card of ``solver``."""
     arguments_by_kind = {
         "part": "`parts`, the parts to switch",
         "node": "`node`, the main nodes of the rigid bodies",
@@ -270,7 +270,7 @@ def name_needed_argument(solver: Module) -> str:
 
 
 def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
-    """Return the ids given as numbers and ranges. If there is no history, all ids of a range are assumed to exist."""
+    """Return the ids given as numbers and ranges. Without a history, all ids in a range are assumed to exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         match = re.fullmatch(_RANGE, piece, re.ASCII)
@@ -299,7 +299,7 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, and the verdict on each of its new windows with the times as printed; ``str`` returns its text.
+    """A card, and a verdict on each of its new windows for the printed times; ``str`` returns the text of the card.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
     ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
@@ -343,7 +343,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card for windows, and judge the windows with the times as printed: as in `verify`, or by ``judge``.
+    """Print the card for windows, and judge their printed times as `verify` does, or by calling ``judge``.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def judge_and_print(
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Return the cautions of a card and of its verdicts, each once, and a caution for each verdict that fails."""
+    """Return the cautions of a card and of its verdicts, each once, with a caution for each verdict that fails."""
     of_verdicts = (
         caution
         for verdict in card.verdicts
@@ -405,7 +405,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; if a run is given, judge the windows by it.
+    """Print solver input for switching windows, as ``d2rpick card`` does; if a run is given, judge the windows.
 
     Parameters
     ----------
@@ -458,7 +458,7 @@ def card(
 def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card for windows; if there is a run, judge the windows with the times as printed."""
+    """Print the card for windows; if there is a run, use it to judge the printed times."""
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -476,7 +476,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the options of the card if there is no history; raise ArgumentError if an option is missing."""
+    """Return the options of a card that has no history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

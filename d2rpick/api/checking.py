@@ -1,4 +1,4 @@
-"""Check decks by the rules and, if there is a history, by the verdicts on their windows."""
+"""Check decks by the rules and, if there is a history, by judging their windows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Findings(Answer, Checks):
 
     @property
     def passed(self) -> bool:
-        """True if all decks were checked, and no finding is as severe as ``fail_on``."""
+        """True if all decks were checked and no finding is as severe as ``fail_on`` or more severe."""
         return not self.failed and all(
             finding.severity.rank > self.fail_on.rank for finding in self.findings
         )
@@ -67,11 +67,11 @@ class Findings(Answer, Checks):
 
     @property
     def windows(self) -> tuple[CheckedWindow, ...]:
-        """Windows of all decks in which parts are rigid."""
+        """Windows in all decks in which parts are rigid."""
         return tuple(window for result in self.results for window in result.windows)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a table with a row per finding and a column per key of ``findings`` in the JSON.
+        """Return a table with a row per finding and a column per key of ``findings`` in the JSON output.
 
         Examples
         --------
@@ -93,7 +93,7 @@ def check(
     ignore: str | Iterable[str] | None = (),
     **choosing: Unpack[Choosing],
 ) -> Findings:
-    """Find the switching cards of decks and check them, as ``d2rpick check`` does.
+    """Find the switching cards in decks and check them, as ``d2rpick check`` does.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def find_findings(
     *,
     command: tuple[str, ...] = (),
 ) -> Findings:
-    """Check the named decks, with the history of a run if one is given."""
+    """Check the named decks, using the history of a run if one is given."""
     judge = None
     if run is None:
         request.without_history()
@@ -196,7 +196,7 @@ def find_findings(
 
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
-    """Check a deck that d2rpick wrote, with the configuration nearest to it in the folders."""
+    """Check a deck that d2rpick wrote, using the nearest configuration in its folder or a parent folder."""
     checked = check_deck(
         deck, find_configuration(deck, Configuration(), SETTINGS), judge
     )
@@ -208,9 +208,9 @@ def check_written(deck: str, judge: HistoryJudge) -> Findings:
 def _check_each(
     deck_names: Sequence[str], rules: Configuration, judge: HistoryJudge | None
 ) -> Iterator[Checked | Unreadable]:
-    """Yield the result for each deck and each run once; a folder stands for its main decks."""
+    """Yield the result for each deck and each run, each once; a folder stands for its main decks."""
     visited: set[str] = set()
-    # Results are cached, because the function asks the system for each parent folder.
+    # Results are cached, because the function makes a system call for each parent folder.
     real_folder = cache(os.path.realpath)
     configured = cache(
         lambda folder: find_configuration(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118  pathlib is slow for many decks
@@ -249,7 +249,7 @@ def _check_each(
 
 
 def _list_decks(name: str) -> list[str] | DeckError:
-    """Return the main decks in a folder, or the deck itself; return an error if a folder contains no decks."""
+    """Return the main decks in a folder, or the deck itself; return an error if the folder contains no decks."""
     try:
         return find_main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path.is_dir fails on some names
     except DeckError as error:
@@ -279,7 +279,7 @@ def _check_one(
     folder: str,
     restarts: Sequence[str],
 ) -> Checked | Unreadable:
-    """Check a deck with the configuration nearest to it. An error is returned, so that other decks are checked."""
+    """Check a deck by the nearest configuration. An error is returned, not raised, so that other decks are checked."""
     source = ""
     try:
         configuration = configured(folder)
@@ -293,5 +293,5 @@ def _check_one(
         if isinstance(error, D2RPickError) and not isinstance(
             error, ConfigurationError | DeckError
         ):
-            raise  # The error concerns the history, by which all decks are judged.
+            raise  # The error concerns the history that is used for all decks.
         return Unreadable(name, error, (source,))

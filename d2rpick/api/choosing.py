@@ -1,4 +1,4 @@
-"""Define the keyword arguments by which pairs are chosen and judged.
+"""Define the keyword arguments that determine how pairs are chosen and judged.
 
 They follow from `d2rpick.choice.options.ChoiceOptions`: ``python -m tests.generated_arguments`` writes this module.
 """
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class JudgingOptions(TypedDict, total=False):
-    """Options that say how a pair is judged.  None stands for the default.
+    """Options that determine how a pair is judged.  None stands for the default.
 
     Times have the unit of the history, or are strings with a unit, such as ``"64ms"``.
 
@@ -35,7 +35,7 @@ class JudgingOptions(TypedDict, total=False):
 
 
 class Choosing(JudgingOptions, total=False):
-    """Options that say how pairs are chosen and judged, as in ``d2rpick suggest``.  None stands for the default.
+    """Options that determine how pairs are chosen and judged, as in ``d2rpick suggest``.  None stands for the default.
 
     ``fit_window``: window of time in which the oscillator is identified.  ``strict``: recommend nothing if only the
     energy shows when the load ends (default: False).  ``keep_vibration``: grade the vibration by the residual alone,

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches parts already in its first computation."""
+"""Drive a Radioss run that switches parts without a reference run."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     from d2rpick.running.sequence import Leg
 
-# Shortest time between td and the next contact [s].
+# Shortest allowed time from td to the next contact [s].
 _SHORTEST = 2e-3
-# Assumed cost of a cycle with rigid parts, relative to a deformable cycle, if the deck does not determine it [-].
+# Assumed cost of a cycle with rigid parts, relative to a deformable cycle, if the deck does not imply it [-].
 _UNKNOWN = 0.5
 
 
@@ -108,7 +108,7 @@ class Driving:
 
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
-        """Lock the folder of the run against other drivers, and yield the driver.
+        """Lock the run's folder against other drivers, and yield the driver.
 
         Raises D2RPickError if another driver is at work there, if the folder contains something else, if the run has
         begun and is not to be resumed, or if the disk is full.
@@ -159,7 +159,7 @@ class Driving:
                 ) from None
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
-        """Return the result of the run so far."""
+        """Return the result of the part of the run that has been computed."""
         legs = driver.journal.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
@@ -206,7 +206,7 @@ class Driving:
 
 
 def _estimate_saving_by_time(legs: Sequence[Leg], end: float) -> float | None:
-    """Return the fraction of the CPU time of the run that is saved [-]; None if it is unknown.
+    """Return the fraction of the run's CPU time that is saved [-]; None if it is unknown.
 
     A run without switching is assumed to cost the mean of the deformable segments throughout.
     """

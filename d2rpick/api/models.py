@@ -1,4 +1,4 @@
-"""Compute the sample models: the requests for the floating oscillator and the rollover box, and their answers."""
+"""Compute the sample models: requests for the floating oscillator and the rollover box, and the answers."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from d2rpick.report.rollover import Scan
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
-# Largest number of states of an oscillator history; a longer text would have several gigabytes.
+# Largest number of states in an oscillator history; a longer history would take up several gigabytes as text.
 MOST_REPLAYED = 10_000_000
 HISTORIES = (
     "csv",
     "hdf5",
     "glstat",
     "matsum",
-)  # Formats of d2rpick.report.history_files, which --help does not import.
+)  # These are the formats of d2rpick.report.history_files, which --help does not import.
 
 MOST_STATES = 1_000_000
 PARAMETERS = (
@@ -44,24 +44,24 @@ PARAMETERS = (
     "tilt",
     "ground_stiffness",
 )
-# Default td, which is 10 ms before the ground contact of the published study [s].
+# Default td [s], which is 10 ms before the ground contact in the published study.
 TD = 0.37
-# Tilt of a falling box, at which it lands on an edge and tumbles [degrees].
+# Tilt of a falling box that lands on an edge and tumbles [degrees].
 TILT = 30.0
-# End time of the simulation [s]; the key is True for a dropped box.
+# Default end time of the simulation [s]; the key is True for a dropped box.
 T_END = {False: 0.42, True: 1.2}
-# Largest energy imbalance of a run without a caution, relative to its largest total energy [-].
+# A run gets a caution if its energy imbalance exceeds this fraction of its largest total energy [-].
 BALANCED = 0.01
 
 
 def _copy_option(name: str, **changes: Any) -> Any:
-    """Return a copy of a request option, with the given attributes changed for this table."""
+    """Return a copy of a request option in which the given attributes are replaced."""
     return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Request for a motion of the oscillator: its parameters, its initial state, and its rigid windows."""
+    """Request for a motion of the oscillator: parameters, initial state, and rigid windows."""
 
     stiffness: float = _copy_option("stiffness")
     mass: float = _copy_option("mass")
@@ -136,12 +136,12 @@ class Motion:
             for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
         }
         oscillator = Request(**parameters, v0=0.0).oscillator
-        # On the command line, the oscillator is always complete, because click requires its options.
+        # On the command line, the oscillator is always complete, because click requires all its options.
         assert oscillator is not None
         return oscillator
 
     def computed(self) -> tuple[Trajectory, Replay | None]:
-        """Return the motion, and its replay with switching if windows are given."""
+        """Return the motion and, if windows are given, the motion with switching."""
         from d2rpick.vibration.oscillator import Replay, compute_trajectory
 
         start = self.start
@@ -156,7 +156,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Box:
-    """Request for the rollover box in SI units: the box, its windows and the scan."""
+    """Request for the rollover box in SI units: its parameters, its windows and the scan."""
 
     tr: tuple[float, ...] = make_option(
         "Switch the box to rigid at this time; for several windows give --tr and --td in pairs.",
@@ -284,7 +284,7 @@ class Box:
 def _check_windows(
     starts: Sequence[float], ends: Sequence[float], t_end: float
 ) -> None:
-    """Raise ArgumentError unless the times are ordered pairs within the run."""
+    """Raise ArgumentError unless the times are ordered pairs within the duration of the run."""
     if len(starts) != len(ends):
         raise ArgumentError("give one --td for each --tr")
     previous_end = None
@@ -303,7 +303,7 @@ def _check_windows(
 
 
 class Scanning:
-    """A scan to be computed: the reference run, the recommendation from this run, and the other values of tr."""
+    """A scan over tr: the reference run, the recommendation derived from it, and the other values of tr."""
 
     def __init__(self, box: Box) -> None:
         from d2rpick.base.workers import count_cores, start_importing
@@ -341,7 +341,7 @@ class Scanning:
 
 
 def warn_if_unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Return a caution if the energy of a run is not balanced, as with damping that acts within a few time steps."""
+    """Return a caution if the energy of a run is not balanced, as can happen with damping over few time steps."""
     imbalance = float(abs(record.imbalance).max())
     if imbalance <= BALANCED:
         return ()

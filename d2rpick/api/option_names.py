@@ -1,4 +1,4 @@
-"""Name the options of the command line in messages that name the arguments of Python."""
+"""Replace the names of Python arguments in messages with the options of the command line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from d2rpick.api.cards import Cards
 from d2rpick.api.request import OPTIONS
 from d2rpick.base.options import list_options, make_option_name
 
-# Arguments that messages name in backticks.
+# Arguments that messages show in backticks.
 ARGUMENTS: Final = (
     *OPTIONS,
     *list_options(Cards),
@@ -26,7 +26,7 @@ ARGUMENTS: Final = (
         "min_mean_energy",
     ),
 )
-# Options whose names differ from these arguments.
+# Options whose names differ from the names of their arguments.
 _OTHERS: Final = {
     "parts": "part",
     "channels": "channel",

@@ -1,4 +1,4 @@
-"""Find the error and saving for each td of a flight, and plan the rigid windows of all flights."""
+"""Find the error and the saving for each td in a flight, and plan the rigid windows of all flights."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.cost import Weights
     from d2rpick.choice.switched.switched_run import Times
 
-_STEPS: Final = 200  # Default number of td values to explore.
+_STEPS: Final = 200  # Default number of td values that are explored.
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -45,13 +45,13 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
     @property
     def answer(self) -> str:
-        """The result of the exploration in one sentence."""
+        """Result of the exploration in one sentence."""
         from d2rpick.report.trade_off import give_answer
 
         return give_answer(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row per td and one column per scalar value of ``offers`` in the JSON; unknown values are NaN.
+        """Return one row per td and one column per scalar key of ``offers`` in the JSON output; unknown values are NaN.
 
         Examples
         --------
@@ -100,7 +100,7 @@ def explore(
     weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Exploration:
-    """Find the error and saving for each td, as ``d2rpick explore`` does.
+    """Find the error and the saving for each td, as ``d2rpick explore`` does.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def explore_for_question(
     td_window: tuple[float, float] | None,
     steps: int,
 ) -> Exploration:
-    """Find the error and saving for each td in a range, or in the longest flight."""
+    """Find the error and the saving for each td in a range, or in the longest flight."""
     check_window("td_window", td_window)
     result = trade_off.explore_run(
         question.reference, question.settings, td_window, td=td, steps=steps
@@ -172,7 +172,7 @@ class Plan(RunAnswer, planning.RunPlan):
     kind = name = "plan"
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per flight and a column per key of ``windows`` in the JSON; unknown values are NaN.
+        """Return a row per flight and a column per key of ``windows`` in the JSON output; unknown values are NaN.
 
         Examples
         --------
@@ -189,7 +189,7 @@ class Plan(RunAnswer, planning.RunPlan):
     def card(
         self, *, every: bool | None = False, **options: Unpack[CardOptions]
     ) -> JudgedCard | None:
-        """Print the card for the next run, and judge its windows with the times as printed.
+        """Print the card for the next run, and judge the printed times of its windows.
 
         The card contains all new windows if ``every`` is True, else only the windows that the history supports.
         """
@@ -199,7 +199,7 @@ class Plan(RunAnswer, planning.RunPlan):
         )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
-        """Print the card for the next run, and judge its new windows; None if there is no new window."""
+        """Print the card for the next run, and judge its new windows; None if there are no new windows."""
         new = self.all_windows if every else self.windows
         question = self.question
         question = question._replace(
@@ -304,7 +304,7 @@ def plan_for_question(
     done: Sequence[Times],
     before: Run | None,
 ) -> Plan:
-    """Plan the rigid windows of a run, or those after the windows ``done`` in a finished run."""
+    """Plan the rigid windows of a run, or the windows that follow the windows ``done`` in a finished run."""
     if before is not None and not done:
         raise ArgumentError(
             "`before` compares the landings of a switched run; name its windows with `done`"
@@ -326,7 +326,7 @@ def plan_for_question(
         before=earlier,
     )
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
-    # The text has one line for each window, in the form that `check` reads from standard input.
+    # The text has one line for each window, in the format that `check` reads from standard input.
     times += ["--done", "-"] if windows else []
     times += [
         text
@@ -339,7 +339,7 @@ def plan_for_question(
 def write_planned_deck(
     plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
 ) -> tuple[list[str], Findings]:
-    """Write a copy of the deck of a plan with the card of the plan, and check the copy against the history.
+    """Write a copy of the plan's deck with the plan's card, and check the copy against the history.
 
     Returns the names of the files, the main one first, and the findings in it.
     """

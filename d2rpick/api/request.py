@@ -1,4 +1,4 @@
-"""Define in one table everything that a user can ask about a run.
+"""Define in a single table everything that a user can ask about a run.
 
 The fields of `Request` determine the options of the command line with their environment variables, the keyword
 arguments of Python, and the command line that repeats an answer.
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 MIN_MEAN_ENERGY: Final = (
-    # Smallest ratio of mean energy to the reference run; well-switched computed runs had at least 0.77.
+    # Smallest accepted mean energy relative to the reference run; well-switched computed runs had at least 0.77.
     0.7
 )
 # Options for reading a history; a deck that is checked defines its parts itself.
@@ -41,7 +41,7 @@ READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
 _READING_FOR_CARDS: Final = tuple(name for name in READING if name != "part")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 _MODEL: Final = (*OSCILLATOR, "no_verify")
-# Options for choosing a pair, for choosing pairs for sets of parts and many runs, and for judging cards.
+# Options for choosing a pair; subsets of them apply to sets of parts, to many runs, and to judging cards.
 _USES: Final = list_uses()
 CHOOSING: Final = (*_USES, *_MODEL)
 CHOOSING_FOR_SETS: Final = (
@@ -56,7 +56,7 @@ ADVANCED: Final = (
 JUDGING: Final = (*_READING_FOR_CARDS, *CHOOSING_FOR_CARDS)
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Placeholder for weights that do not come from a file.
-# A command line with this placeholder for weights is refused, because it cannot repeat the weights.
+# A command line with this placeholder is refused, because it does not contain the weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
 
@@ -112,7 +112,7 @@ class ReadingOptions:
 # A frozen class of options would increase the start-up time of each command by 2 %.
 @dataclass(eq=False, repr=False, kw_only=True)
 class Request(ChoiceOptions, ReadingOptions):
-    """A question about a run with times in the unit of the history; contradictions raise ArgumentError.
+    """A question about a run, with times in the unit of the history; contradictions raise ArgumentError.
 
     ``given`` names the options that were given, also those given with their default value.
     """
@@ -135,7 +135,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
-    run_folder: str | None = None  # Folder of the run whose files `history` names.
+    run_folder: str | None = None  # Folder of the run with the files in `history`.
     # True if `deck` was found in the folder of the run.
     deck_in_folder: bool = False
     given: Collection[str] | None = None
@@ -166,7 +166,7 @@ class Request(ChoiceOptions, ReadingOptions):
 
     @property
     def folder(self) -> str | None:
-        """The folder of the run, which should contain its main deck; None if a deck is named or excluded."""
+        """Folder of the run, which should contain its main deck; None if a deck is named or excluded."""
         import os
 
         if self.deck is not None or self.no_deck:
@@ -252,7 +252,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
-        """Return the given options, or only the options in ``names``, as typed after a td on the command line."""
+        """Return the given options, or only those in ``names``, as typed after a td on the command line."""
         chosen = list(self._given())
         if names is not None:
             chosen = [name for name in chosen if name in names]
@@ -263,14 +263,14 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def judging(self) -> tuple[str, ...]:
-        """Return the options with which ``card`` and ``check`` judge windows by the same history."""
+        """Return the options with which ``card`` and ``check`` use the same history to judge windows."""
         history_options = [
             text for name in self.history for text in ("--history", name)
         ]
         return (*history_options, *self.asking(JUDGING), *self.asking(("part",)))
 
     def repeat(self, *, without: Collection[str] = ()) -> RepeatedQuestion:
-        """Return the words of the command line with which other commands ask about the same run."""
+        """Return the parts of the command line with which other commands ask about the same run."""
         from d2rpick.report.formats import RepeatedQuestion
 
         left_out = {"part", *without}
@@ -284,7 +284,7 @@ class Request(ChoiceOptions, ReadingOptions):
         )
 
     def without_history(self) -> None:
-        """Refuse options for judging if there is no history."""
+        """Refuse options for judging windows if there is no history."""
         if lost := [
             name
             for name in self._given()
@@ -322,7 +322,7 @@ def _write_word(value: Any) -> str:
 
 
 def read_channels(texts: Collection[str]) -> tuple[tuple[str, str], ...]:
-    """Read ``QUANTITY=NAME``; raise ArgumentError if the quantity is unknown or given twice."""
+    """Read ``QUANTITY=NAME``; raise ArgumentError if the quantity is unknown or occurs twice."""
     from d2rpick.histories.names import QUANTITIES, suggest_name
 
     split = (text.partition("=") for text in texts)

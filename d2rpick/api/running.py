@@ -38,7 +38,7 @@ def first(
     after: Time | None = None,
     overwrite: bool | None = False,
 ) -> FirstRun:
-    """Write a copy of a deck so that its first run switches the parts by itself, as ``d2rpick first`` does.
+    """Write a copy of a deck that switches the parts in its first run, as ``d2rpick first`` does.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Provide runs for scripts, from files, from memory, or from a table."""
+"""Provide runs to scripts from files, from memory, or from a table."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """One run: its opened files, and the named columns of a table; it is immutable.
+    """One run: its opened files, and the columns that the user assigned in a table; it is immutable.
 
     A run can be pickled: a copy, also in another process, contains the same bytes, or opens the same big files again.
     Two runs are equal if the same bytes were read under the same names, in the same way.
@@ -85,12 +85,12 @@ class Run:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """Parts with histories of their own; each has an ``id`` and a ``title``."""
+        """Parts that have their own histories; each has an ``id`` and a ``title``."""
         return self.files.parts
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the readers on what they omitted and assumed."""
+        """Notes on what the readers omitted and assumed."""
         return self.files.notes
 
     def overview(self, deck: arguments.Deck | None = None) -> Overview:
@@ -248,7 +248,7 @@ def from_frame(
     channels: Mapping[str, str | int] | None = None,
     name: str | None = "frame",
 ) -> Run:
-    """Take the energies of a run from a table of pandas, polars, pyarrow, xarray or numpy.
+    """Take the energies of a run from a pandas, polars, pyarrow, xarray or numpy table.
 
     The table is checked like the CSV file that ``frame.to_csv()`` writes: times must rise, values must be finite
     numbers.
@@ -297,7 +297,7 @@ def from_frame(
 
 
 def _set_time_column(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
-    """Turn the index into a column if it is the time; raise ValueError if nothing is named as the time."""
+    """Turn the index into a column if it contains the times; raise ValueError if nothing is named as the time."""
     from d2rpick.histories.meaning import is_time
 
     index = frame.index
@@ -347,7 +347,7 @@ def _open_sources(
 
 
 def check_format(input_format: str | None) -> str:
-    """Return the name of a format, or ``"auto"``; raise ValueError for any other name."""
+    """Return the name of a format, or ``"auto"``; raise ValueError for all other names."""
     from d2rpick.histories.formats import READERS
 
     if input_format is None:
@@ -366,7 +366,7 @@ def make_selection(
     energy: str | int | Iterable[str | int] | None,
     channels: Mapping[str, str | int] | None = None,
 ) -> Selection:
-    """Return the selected columns; raise TypeError for other types, ValueError for an unknown quantity."""
+    """Return the selected columns; raise TypeError for other types, and ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
     single = (
@@ -408,7 +408,7 @@ def make_selection(
 def extract_columns(
     run: histories.OpenedRun, selection: Selection
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Return the selected columns of a run, all quantities known at their times, and notes on these quantities.
+    """Return the selected columns of a run, all quantities that are known at the same times, and notes on them.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, ``not_chosen_part_<id>`` for each part
     that flies with them, then quantities of the whole model and the momentum that shows the flight, each of shape (n,).
@@ -450,7 +450,7 @@ def extract_columns(
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the energy balance of the whole model at the times of the energy, keyed by name.
+    """Return the energy terms of the whole model, keyed by name; empty unless they have the same times as the energy.
 
     The kinetic energy includes rotation.  The internal energy is included if the selected energy is that of some parts.
     """

@@ -1,4 +1,4 @@
-"""Ask the same question about many runs. A file with a line for each judged run allows a study to be resumed."""
+"""Ask the same question about many runs. A file with a line for each judged run makes it possible to resume a study."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from d2rpick.api.choosing import Choosing
 
 _FIRST: Final = b'{"source": '
-_LAST: Final = b'{"schema": '  # Beginning of the summary line below the rows.
+# First bytes of the summary line, which follows the rows.
+_LAST: Final = b'{"schema": '
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -59,7 +60,7 @@ class Study(Paged, core.StudyOfRuns):
     kind = "study"
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a row per run and a column per key of ``runs`` in the JSON; unknown values are NaN.
+        """Return a row per run and a column per key of ``runs`` in the JSON output; unknown values are NaN.
 
         Examples
         --------
@@ -146,7 +147,7 @@ def study(
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:
-    """Replace patterns with the files and folders that they match, each of which is a run. Other names are kept."""
+    """Replace patterns with the matching files and folders, each of which is a run. Other names are kept."""
     from glob import glob
 
     runs: list[str] = []
@@ -196,7 +197,7 @@ def compute_rows(
     absolute: bool = False,
     told: Callable[[int], None] | None = None,
 ) -> Iterator[StudyRow]:
-    """Yield the rows in the order of the runs, each as soon as all rows before it are computed.
+    """Yield the rows in the order of the runs, each as soon as it and all rows before it are computed.
 
     Parameters
     ----------
@@ -240,13 +241,13 @@ def compute_rows(
 
 
 def compute_fingerprint(question: Question) -> str:
-    """Return a digest of everything besides its files that affects a row: the options and the version."""
+    """Return a digest of the options and the version, which affect a row in addition to the files of its run."""
     values = {**asdict(question), "curve": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def write_row(row: StudyRow, question_digest: str) -> str:
-    """Return a row as one line that contains its values and the data needed to read it back.
+    """Return a row as one line that contains its values and the data needed to restore it.
 
     ``asked`` is the ``fingerprint`` of the question.
     """
@@ -262,7 +263,7 @@ def write_row(row: StudyRow, question_digest: str) -> str:
 
 
 class Ledger:
-    """A file of finished rows, one per line; it may be missing at first.
+    """A file of finished rows, one per line; the file need not exist yet.
 
     Damaged lines are skipped, among them an incomplete last line of a killed study.
 
@@ -292,7 +293,8 @@ class Ledger:
             with Path(name).open("a+b") as file:
                 file.seek(0)
                 content = file.read()
-            if new:  # The file is deleted, because the first row creates it again.
+            # The empty file is deleted, because the first row creates it again.
+            if new:
                 Path(name).unlink()
         except OSError as error:
             raise FormatError(
@@ -339,7 +341,7 @@ class Ledger:
         return None
 
     def taking(self, sources: Sequence[str]) -> int:
-        """Count the runs whose rows are already in the file."""
+        """Return the number of runs whose rows are already in the file."""
         self.known = {
             number: row
             for number, source in enumerate(sources)
@@ -360,8 +362,8 @@ class Ledger:
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:
-        """Append the row of a judged run; the file contains the row when this method returns."""
-        # A row that is not stored is computed again next time.
+        """Append the row of a judged run; the row is on disk when this method returns."""
+        # A row that is not stored will be computed again next time.
         if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):
             return
         try:

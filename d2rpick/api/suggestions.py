@@ -1,4 +1,4 @@
-"""Choose the switch times tr and td, and judge a given pair of them."""
+"""Choose the switch times tr and td, or judge a given pair."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ class Suggestion(RunAnswer, answers.PairSuggestion):
         )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None if there is no recommendation."""
+        """Print the card of the recommended pair and judge the printed times; None if no pair is recommended."""
         return self.printed(Cards.for_run(self.question.run, options))
 
     def printed(self, cards: Cards) -> JudgedCard | None:
-        """Print the card of the recommended pair, judged as printed; None if there is no recommendation."""
+        """Print the card of the recommended pair and judge the printed times; None if no pair is recommended."""
         pair = self.recommended
         question = self.question
         judge = partial(
@@ -126,7 +126,7 @@ class Verdict(RunAnswer, answers.PairVerdict):
         return self.candidate.tr
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the measures of the pair as a one-row table with the same columns as the CSV; unknown values are NaN.
+        """Return the values of the pair as a one-row table with the same columns as the CSV; unknown values are NaN.
 
         Examples
         --------
@@ -231,7 +231,7 @@ def suggest(
 def suggest_for_question(
     question: RunQuestion, td: float | tuple[float, float] | None
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in a range or, for None, in the longest flight."""
+    """Choose tr for ``td``, or both times with td in a range; None stands for the longest flight."""
     result = answers.suggest_in_run(question.reference, td, question.settings)
     if (
         result.better_pair
@@ -326,7 +326,7 @@ def judge_pair(
     switched: Run | None = None,
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
-    """Judge a pair, also by a finished switched run if there is one, which defines the times that are not given."""
+    """Judge a pair; a finished switched run, if given, is compared too and provides the times that are not given."""
     check_pair(tr, td, switched)
     switched_reference = switched and question.reference.like(
         switched.files, question.selection

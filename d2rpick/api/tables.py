@@ -1,4 +1,4 @@
-"""Convert tables of other libraries to pandas frames; these libraries are not imported."""
+"""Convert tables of other libraries to pandas frames without importing these libraries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _METHODS_OF_TABLES: Final = (
 
 
 def is_table(value: Any) -> bool:
-    """Return True if a value is a table of some library or an array of numbers, and not the name of a file.
+    """Return True if a value is a table of some library or an array of numbers, and False for the name of a file.
 
     Examples
     --------
@@ -60,16 +60,16 @@ def convert_to_frame(table: Any) -> pd.DataFrame:
         return table
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
-    # The table is an object of xarray; only a DataArray has a name.
+    # The table is an xarray object; only a DataArray has a name.
     if hasattr(table, "to_dataframe"):
         if hasattr(table, "name"):
             frame = table.to_dataframe(name=_SERIES_NAME)
         else:
             frame = table.to_dataframe()
         return pd.DataFrame(frame)
-    if hasattr(table, "collect"):  # The table is a lazy frame of polars.
+    if hasattr(table, "collect"):  # The table is a lazy polars frame.
         table = table.collect()
-    # The table is a frame of polars, whose own conversion needs pyarrow.
+    # The table is a polars frame; its own conversion to pandas needs pyarrow.
     if hasattr(table, "columns") and hasattr(table, "get_column"):
         return pd.DataFrame(
             {str(name): table.get_column(name).to_numpy() for name in table.columns}

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TimeUnit(NamedTuple):
-    """The time unit of a run, empty if it is unknown, and the file that should name the unit."""
+    """Time unit of a run, empty if it is unknown, and the source that should name the unit."""
 
     name: str
     source: str
@@ -48,12 +48,12 @@ class TimeArguments:
 
     @classmethod
     def of_deck(cls, deck: str | None) -> TimeArguments:
-        """Return a check that converts times to the unit of a deck; only Radioss decks name a unit."""
+        """Return a converter of times to the unit of a deck; only Radioss decks name a unit."""
         return cls(lambda: find_unit_of_deck(deck))
 
     @classmethod
     def of_run(cls, run: Run | None) -> TimeArguments:
-        """Return a check that converts times to the unit of a run."""
+        """Return a converter of times to the unit of a run."""
         return cls(lambda: find_unit_of_run(run))
 
     def check_time(
@@ -75,7 +75,7 @@ class TimeArguments:
     def convert_options(
         self, values: Mapping[str, Any], options: Mapping[str, Option]
     ) -> dict[str, Any]:
-        """Return the values of options, keyed by name; values that are times are converted."""
+        """Return the values of options, keyed by name, after converting the times among them."""
         return {
             name: self.convert(name, value)
             if name in options and options[name].is_time
@@ -84,7 +84,7 @@ class TimeArguments:
         }
 
     def convert(self, name: str, value: object) -> object:
-        """Return a value in which each time with a unit is replaced by a number, also in lists and tuples.
+        """Return a value in which each time with a unit is replaced by a number, even within lists and tuples.
 
         Raises
         ------
@@ -158,12 +158,12 @@ def find_common_unit(
 
 
 def _choose_only_unit(units: set[str]) -> str:
-    """Return the only unit; empty if there are none or several."""
+    """Return the unit if there is only one; empty if there are none or several."""
     return next(iter(units)) if len(units) == 1 else ""
 
 
 def convert_typed_time(text: str, unit: str, source: str) -> float:
-    """Return a typed time as a number in the ``unit`` of the run; raise an error if ``source`` names no unit.
+    """Return a typed time as a number in the ``unit`` of the run; raise an error if the unit is unknown.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Define one-line errors and cautions, each with the place, the value found, the value expected, and the cure."""
+"""Define one-line errors and warnings; each names the place, the value found, the value expected, and the remedy."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-# Unicode categories that are escaped: control and format characters, and line separators.
+# Unicode categories of the characters that are escaped: control and format characters, and line separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
-_MOST_NAMED: Final = 20  # largest number of names that one message lists
+_MOST_NAMED: Final = 20  # Largest number of names listed in one message.
 
-# Code of the caution on an input that was skipped because of a bug in the program.
+# Code of the warning that an input was skipped because of a bug in the program.
 INTERNAL_ERROR: Final = "internal-error"
 
 
@@ -33,7 +33,7 @@ class ChangedError(D2RPickError):
 
 
 class HistoryError(D2RPickError):
-    """Numbers were read, but they do not form an energy history."""
+    """Numbers were read, but they are not a valid energy history."""
 
 
 class RangeError(D2RPickError):
@@ -59,12 +59,12 @@ class Caution(NamedTuple):
     message: str
 
 
-# Errors with a cause outside the program, such as wrong input, a full disk or too little memory.
+# Errors with a cause outside the program, such as invalid input, a full disk or too little memory.
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 
 
 def give_if_written(read: Callable[[], _Read]) -> _Read | None:
-    """Return the result of ``read``; None if the files lack the data in some state."""
+    """Return the result of ``read``, or None if the files lack the data at any state."""
     try:
         return read()
     except FormatError:
@@ -72,7 +72,7 @@ def give_if_written(read: Callable[[], _Read]) -> _Read | None:
 
 
 def format_in_one_line(error: BaseException) -> str:
-    """Return any error as a one-line message; an unforeseen error asks the user to report it.
+    """Return any error as a one-line message; for an unforeseen error, the message asks the user to report it.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def make_printable(text: str) -> str:
 
 
 def format_ranges(ids: Iterable[int]) -> list[str]:
-    """Format numbers in ascending order; three or more consecutive numbers become a range.
+    """Format numbers in ascending order; three or more consecutive numbers are written as a range.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def format_ranges(ids: Iterable[int]) -> list[str]:
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:
-    """Return a short list of part ids for a message; a long list is cut, with the number of the remaining ids.
+    """Return a short list of part ids for a message; a long list is cut and ends with the number of omitted ids.
 
     Examples
     --------
@@ -159,14 +159,14 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
 
 
 def choose_verb(things: Collection[object]) -> str:
-    """Return "is" for a single thing, otherwise "are"."""
+    """Return "is" for one thing and "are" for several."""
     return "is" if len(things) == 1 else "are"
 
 
 def list_names(
     names: Sequence[object], most: int = _MOST_NAMED, between: str = ", "
 ) -> str:
-    """Return printable names in one line; the list is cut after ``most`` names.
+    """Return printable names on one line; the list is cut after ``most`` names.
 
     Examples
     --------

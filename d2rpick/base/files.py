@@ -1,4 +1,4 @@
-"""Read files within limits on their content, detect changes during reading, and replace files as a whole.
+"""Read files within size limits, detect changes during reading, and replace files atomically.
 
 Lines of JSON that a program resumes from have a checksum, so that a damaged line is recognised.
 """
@@ -21,40 +21,40 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 STDIN: Final = "-"  # File name that stands for standard input.
-# Limits on the content of a file, each with its default value and its unit.
+# Limits on the content of a file, each with its default and its unit.
 _BOUNDS: Final = {
     "RATIO": (
         100.0,
         "times as many bytes",
-    ),  # largest ratio of unpacked to packed size; real histories have a ratio of 3 to 30
-    # largest unpacked size [bytes], because unpacked data are kept in memory
+    ),  # Largest ratio of unpacked to packed size; real files: 3 to 30
+    # Largest unpacked size [bytes]; it is limited because unpacked data are kept in memory.
     "UNPACKED": (4e9, "bytes"),
     "LINE": (
         1e6,
         "bytes",
-    ),  # largest length of a line [bytes], enough for about 50,000 columns
+    ),  # Largest length of a line [bytes]; it is enough for about 50,000 columns.
     "DEPTH": (100.0, "groups"),
 }
-# Smallest unpacked size for which the ratio is checked [bytes]; constant columns reach a ratio of 1000.
+# The ratio of unpacked to packed size is checked above this unpacked size [bytes]; constant columns reach 1000.
 _ALLOWED: Final = 1 << 24
-_TRIES: Final = 5  # number of attempts to read a file that keeps changing
-_TICK: Final = 50_000_000  # Resolution of most file times [ns].
+_TRIES: Final = 5  # Number of attempts to read a file that keeps changing.
+_TICK: Final = 50_000_000  # Resolution of the file times on most file systems [ns].
 # Resolution of file times on file systems that store seconds without fractions [ns].
 _COARSE: Final = 2_000_000_000
-# Longest time for writing a byte [ns]. A system may set the file time when the last write begins.
+# Longest time needed to write a byte [ns]. A system may set the file time when the last write begins.
 _SLOWEST: Final = 5
-# Pause before a file is read again because a write may be in progress [s].
+# Pause before a file that may still be being written is read again [s].
 _PAUSE: Final = 0.05
 _CHECKSUM: Final = ', "checksum": "'
 
 
 class Searched(Protocol):
-    """Bytes in which the last occurrence of a mark can be found."""
+    """A bytes-like object that can be searched backwards for a marker."""
 
     def __len__(self) -> int: ...
 
     def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
-        """Return the offset of the last occurrence of ``wanted`` between two offsets, or -1."""
+        """Return the offset of the last occurrence of ``wanted`` between two offsets, or -1 if there is none."""
 
 
 def bound(name: str) -> float:
@@ -73,7 +73,7 @@ def bound(name: str) -> float:
 
 
 def describe_excess(name: str, value: float = float("inf")) -> str:
-    """Return a message with the cure if a value exceeds its limit, otherwise an empty string.
+    """Return a message with the remedy if a value exceeds its limit, otherwise an empty string.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def describe_unpacked_excess(packed: int, unpacked: int) -> str:
 
 
 def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
-    r"""Return the offset of a line that exceeds the limit, or -1; only a part of the data is examined.
+    r"""Return the offset of a line that exceeds the length limit, or -1; only part of the data is examined.
 
     ``most`` is the bound, if it is known already.
 
@@ -114,7 +114,7 @@ def find_long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 
 class FileState(NamedTuple):
-    """Identity, size and times of a file; ``settled`` if no write is pending and any later write would change them."""
+    """Identity, size and times of a file; ``settled``: no write is pending, and any later write would change them."""
 
     device: int
     inode: int
@@ -125,12 +125,12 @@ class FileState(NamedTuple):
 
     @classmethod
     def of(cls, file: FileIO) -> FileState:
-        """Return the present state of an open file."""
+        """Return the current state of an open file."""
         return cls.of_stat(os.fstat(file.fileno()))
 
     @classmethod
     def of_stat(cls, status: os.stat_result, *, may_grow: bool = False) -> FileState:
-        """Return the present state of a file, given its status from the operating system.
+        """Return the current state of a file from the status reported by the operating system.
 
         A write in progress to a file that ``may_grow`` appends to it, so that its size does not matter.
         """
@@ -152,18 +152,18 @@ class FileState(NamedTuple):
         )
 
     def is_as(self, earlier: FileState) -> bool:
-        """Return True if this is the same file without any visible change."""
+        """Return True if this is the same file and shows no change."""
         return self[:-1] == earlier[:-1]
 
     def continues(self, earlier: FileState) -> bool:
-        """Return True if this is the same file, which may have grown. A new file can reuse the inode of an old one."""
+        """Return True if this is the same file, possibly grown. A new file can reuse the inode number of an old one."""
         return self.is_as(earlier) or (
             self[:2] == earlier[:2] and self.size > earlier.size
         )
 
 
 def compute_slowness(changed: int, size: int) -> int:
-    """Return the extra time [ns] before a state counts as settled: large files and coarse file times need longer."""
+    """Return the extra time before a state counts as settled [ns]; large files and coarse file times need more."""
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
@@ -210,18 +210,18 @@ def wait_for_settled_states(
 
 
 def _settle(name: str, state: FileState) -> FileState:
-    """Return the state of a file; it counts as settled if the file has only grown since ``state`` was read."""
+    """Return the state of a file; the state counts as settled if the file has only grown since ``state`` was read."""
     now = state if state.settled else _state_of(name)
     return state._replace(settled=True) if now.continues(state) else now
 
 
 def _state_of(name: str) -> FileState:
-    """Return the present state of a file that may grow."""
+    """Return the current state of a file that may grow."""
     return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  os.stat is faster for many files
 
 
 def read_into(file: FileIO, room: memoryview, begin: int) -> int:
-    """Fill ``room`` with the bytes of a file after an offset; return their number, which is less if the file ends."""
+    """Fill ``room`` with the bytes of a file after an offset; return the number of bytes read (fewer at its end)."""
     done = 0
     while done < len(room):
         # One call may return fewer bytes than requested, and never returns more than 2 GB.
@@ -263,7 +263,7 @@ def read_at_rest(
 
 
 def write_as_a_whole(path: Path, content: bytes) -> None:
-    """Write a file completely or not at all: a temporary file in the same folder replaces it at the end.
+    """Write a file completely or not at all: the data go to a temporary file, which replaces the old file at the end.
 
     A replaced file keeps its mode, and its owner and group as far as the user may set them. A link stays, and the
     file to which it points is replaced; a device or a named pipe is written to.
@@ -275,12 +275,12 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
         return
     try:
         path = path.resolve()
-    except RuntimeError:  # Python before 3.13 raises this for links that form a loop
+    except RuntimeError:  # Python before 3.13, for links that form a loop
         path = path.absolute()
-    # A name that is still a link after resolve() is part of a loop of links.
+    # If resolve() still returns a link, the link is part of a loop.
     if path.is_symlink():
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
-    # The temporary name is not derived from the file name, which may already have the largest allowed length.
+    # The temporary name is not derived from the file name, which may already have the maximum length.
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
     scratch = path.parent / temporary
     try:
@@ -294,24 +294,24 @@ def write_as_a_whole(path: Path, content: bytes) -> None:
 
 
 def _copy_access(replaced: Path, scratch: Path) -> None:
-    """Copy owner, group and mode of the file that will be replaced; if there is none, use the mode of any new file."""
+    """Copy owner, group and mode of the file that will be replaced; without such a file, use the default mode."""
     try:
         status = replaced.stat()
     except FileNotFoundError:
         mask = os.umask(0)
         os.umask(mask)
-        # mkstemp creates files that only the owner can access
+        # mkstemp creates files that only their owner can access.
         scratch.chmod(0o666 & ~mask)
         return
     if hasattr(os, "chown"):
         with suppress(PermissionError):
             os.chown(scratch, status.st_uid, status.st_gid)
-    # The mode is set after the owner, because changing the owner clears the set-user-id bits.
+    # The mode is set after the owner, because a change of owner clears the set-user-id bits.
     scratch.chmod(stat.S_IMODE(status.st_mode))
 
 
 def append_as_a_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
-    """Append to a file completely; after an OSError, the file is unchanged. ``durable`` waits for the disk."""
+    """Append all data to a file, or leave the file as it was and raise OSError; ``durable`` waits for the disk."""
     size = None
     try:
         with path.open("ab") as file:

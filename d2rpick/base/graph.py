@@ -1,4 +1,4 @@
-"""Search a graph for all nodes that can be reached from given nodes."""
+"""Search a graph for all nodes that are reachable from the given nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def find_reachable(
     *,
     wide: bool = False,
 ) -> list[Node]:
-    """Return the starts and all nodes reached from them by repeated steps of ``further``, without duplicates.
+    """Return the starts and all nodes reachable from them by repeated calls of ``further``, without duplicates.
 
     The search is depth first; if ``wide`` it is breadth first, so that the nearest nodes come first.
 

@@ -1,4 +1,4 @@
-"""Let an interrupt end the process from which workers are forked, at once and without a message.
+"""Let an interrupt end the process that forks the workers, immediately and without a message.
 
 The process starts with SIGINT blocked, so that its start cannot print a traceback either. A parent that ignores
 SIGINT, as a background job does, passes that on.

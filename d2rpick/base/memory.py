@@ -1,4 +1,4 @@
-"""Cache results computed from a record, so that every td that needs a result uses the same one."""
+"""Cache results computed from a record so that every td reuses them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
     class Remembering(Protocol):
-        """A record of a run that keeps the results computed from it."""
+        """A record of a run that stores the results computed from it."""
 
         @property
         def memory(self) -> Memory:
@@ -20,7 +20,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 class Memory:
-    """Results of cached functions for one record, keyed by function and arguments.
+    """Results of the cached functions for one record, keyed by function and arguments.
 
     The memory lives as long as the record, which is read anew for each question.  A copy in another process starts
     empty.
@@ -34,7 +34,7 @@ class Memory:
 
 
 def remember(function: _Function) -> _Function:
-    """Decorate a function so that it computes each result only once for a record.
+    """Decorate a function so that it computes each result only once per record.
 
     The record is the first argument.  The results are kept by the other positional arguments, which must be hashable;
     what is given by keyword must follow from these, or be without influence on the result.

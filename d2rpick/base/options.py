@@ -1,4 +1,4 @@
-"""Describe an option once: its help text, the kind of its value, and the limits of its value.
+"""Describe each option in one place: its help text, the type of its value, and the limits of its value.
 
 The command line, the arguments of Python and the settings of a choice are made from tables of such options: dataclasses
 whose fields are made by `make_option`.
@@ -13,9 +13,9 @@ from typing import Any, Final
 from d2rpick.base.ranges import Number
 from d2rpick.base.tuples import NamedTuple
 
-# Upper limit of a range of whole numbers without an upper limit of its own.
+# Upper limit of an integer range that has no upper limit of its own.
 UNLIMITED: Final = 2**63
-# Ranges of numbers, each named after the numbers that it contains.
+# Ranges of numbers; each name says which numbers the range contains.
 TIME: Final = Number()
 POSITIVE: Final = Number(0.0, above=True)
 NOT_NEGATIVE: Final = Number(0.0)
@@ -24,7 +24,7 @@ AT_LEAST_ONE: Final = Number(1.0)
 
 
 class Option(NamedTuple):
-    """An option: the ``kind`` of its value, its help text, and the options that it replaces.
+    """An option: the ``kind`` of its value, its help text, and the options that it overrides.
 
     ``kind`` is a `Number`, a range of whole numbers, a list of names, or a kind of the command line: "flag", "file",
     "names", ...  ``many``: it can be repeated; ``pair``: two values.
@@ -40,7 +40,7 @@ class Option(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the value of the option is a time of the run, or a time window."""
+        """True if the value of the option is a time of the run or a time window."""
         return self.metavar in ("T", "LO HI")
 
 
@@ -73,5 +73,5 @@ def list_options(table: Any) -> dict[str, Option]:
 
 
 def make_option_name(name: str) -> str:
-    """Return the name of an option as it is typed."""
+    """Return the name of an option as it is typed on the command line."""
     return name.replace("_", "-")

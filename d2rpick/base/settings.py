@@ -1,9 +1,9 @@
-"""Read the settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml.
+"""Read the settings closest to a folder, from ``d2rpick.toml`` or from ``[tool.d2rpick]`` in pyproject.toml.
 
 The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
 """
 # ruff: noqa: PTH100, PTH110, PTH111, PTH113, PTH116, PTH118, PTH120, PTH121, PTH123
-# Every command looks for settings, and importing pathlib takes longer than this search.
+# Every command searches for settings, and importing pathlib would take longer than this search.
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _OF_REPOSITORIES: Final = (".git", ".hg")  # Folders that mark the root of a repository.
-# Settings of the deck check; the search covers the folder of each deck and the folders above it.
+# Name of the settings file of the deck check; the folder of each deck and the folders above it are searched.
 RULE_KEYS: Final = ("select", "ignore", "severity")
-# Quotes and blanks that may surround the parts of a dotted key.
+# Quotes and spaces that may surround the parts of a dotted key.
 _UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))
 _MOST_KEYS_NAMED: Final = 8
-_LONGEST_VALUE: Final = 60  # largest number of characters of a quoted value
+_LONGEST_VALUE: Final = 60  # Largest number of characters quoted
 
 
 class NearestSettings(NamedTuple):
-    """The settings that apply to a folder.
+    """The settings that apply in a folder.
 
     ``table`` is empty if there are none.  ``source`` names their file, or is empty.  ``notes`` name nearer files that
     are not used because another user owns them.
@@ -71,7 +71,7 @@ def find_nearest_settings(folder: str) -> NearestSettings:
 
 
 def _list_searched_folders(folder: str) -> Iterator[str]:
-    """Yield a folder and the folders above it, up to the root of its repository or to the user's home.
+    """Yield a folder and the folders above it, up to the repository root or the user's home folder.
 
     Outside both, the search ends below the first folder that another user owns, and below the root of the system.
     """
@@ -92,7 +92,7 @@ def _list_searched_folders(folder: str) -> Iterator[str]:
 
 
 def _is_owned_by_user(path: str) -> bool:
-    """Return True if the user owns a file or folder and the link to it; always True on Windows."""
+    """Return True if the user owns a file or folder and any link to it; always True on Windows."""
     if not hasattr(os, "geteuid"):
         return True
     user = os.geteuid()
@@ -123,7 +123,7 @@ def format_toml_value(value: object) -> str:
 
 
 def locate_setting(path: str, key: str, table: str = "") -> str:
-    """Return the place ``path:line`` where a settings file sets ``key`` in ``table``; the path if no line does.
+    """Return ``path:line`` of the line that sets ``key`` in ``table``, or only the path if no line does.
 
     A ``table`` named "" is the top of the settings, in which a key may be the head of a table.
     """
@@ -174,13 +174,13 @@ def _has_settings(path: str) -> bool:
 
 
 def _may_have_settings(text: str) -> bool:
-    """Return False if a pyproject.toml cannot define ``tool.d2rpick``, which avoids importing a parser."""
+    """Return False if a pyproject.toml cannot define ``tool.d2rpick``; this test avoids importing a parser."""
     solid = text.translate(_UNIMPORTANT)
     return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
 
 
 def _explain_toml_error(path: str, error: Exception) -> str:
-    """Return the message for a file that cannot be read as TOML, with the line and the cure if they are known."""
+    """Return the message for a file that is not valid TOML, with the line and the remedy if they are known."""
     place = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
     if place is None:
         return f"{path}: {error}; valid TOML was expected"
@@ -196,9 +196,9 @@ def _explain_toml_error(path: str, error: Exception) -> str:
 
 
 def _read_table(path: str, *, shared: bool) -> object:
-    """Read the settings in a TOML file; None if a file that is ``shared`` with other tools has no settings."""
+    """Return the settings in a TOML file, or None if a file ``shared`` with other tools contains no settings."""
     try:
-        # utf-8-sig: editors on Windows begin a text with a byte order mark
+        # The encoding is utf-8-sig, because editors on Windows may begin a text with a byte order mark.
         with open(path, encoding="utf-8-sig") as file:
             text = file.read()
         if shared and not _may_have_settings(text):
@@ -206,7 +206,7 @@ def _read_table(path: str, *, shared: bool) -> object:
         import tomllib
 
         table = tomllib.loads(text)
-        # Python refuses to print numbers with thousands of digits, which a message may contain
+        # A message may contain an integer with thousands of digits, which Python refuses to print.
         repr(table)
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(_explain_toml_error(path, error)) from None

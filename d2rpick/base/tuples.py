@@ -1,4 +1,4 @@
-"""Define named tuples whose annotations are not evaluated, because evaluating them takes most of the import time.
+"""Define named tuples whose annotations are not evaluated, because evaluation takes most of the import time.
 
 A command imports some forty of them, and start-up is part of the product. A `Record` may inherit fields of other
 records (all with defaults), which come between its own fields without and with defaults.

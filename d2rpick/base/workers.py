@@ -1,4 +1,4 @@
-"""Compute many calls: in this process, in a pool of processes, or on a Dask cluster."""
+"""Compute many calls in this process, in a pool of processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# A fork copies the locks of all threads. Forking from one clean process avoids this and is nearly as fast.
+# A fork copies the locks of all threads. Forking from a clean process avoids this and is nearly as fast.
 _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-# Number of calls queued for each process; it keeps the processes busy and needs little memory.
+# Number of calls queued per process; it is large enough to keep the processes busy and small enough to save memory.
 _WAITING = 2
-# Smallest number of calls given to a cluster at a time, because its number of workers may change.
+# Smallest number of calls sent to a cluster at a time, because its number of workers may change.
 _LEAST_ON_CLUSTER = 64
 # Largest number of attempts to start a pool; the fork server is restarted after the first attempt.
 _STARTS = 3
-_DYING = 0.1  # pause between attempts [s], so that the system can end a killed process
-# Errors raised if a process is started after the fork server was killed.
+_DYING = 0.1  # Pause between attempts to start a pool [s]; it lets the system finish ending a killed process.
+# Errors raised when a process is started after the fork server was killed.
 _NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
-# Timeout for a scheduler's reply [s].
+# Longest wait for a reply from the scheduler [s].
 _PATIENCE = 10
 
 
@@ -60,7 +60,7 @@ class Finished(NamedTuple):
 
 
 class _Call(NamedTuple):
-    """The call for one item; it ``is_suspect`` if the pool that computed it broke."""
+    """A call for one item; ``is_suspect`` is True if the pool that computed the call broke."""
 
     number: int
     item: Any
@@ -79,14 +79,14 @@ class Farm:
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the result of ``function`` for all items, in the order in which they finish."""
+        """Yield the results of ``function`` for all items, in the order in which the calls finish."""
         return (
             _compute_call(number, function, item) for number, item in enumerate(items)
         )
 
 
 def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
-    """Compute one call; an error becomes part of the answer."""
+    """Execute one call; an exception is returned in the result instead of being raised."""
     try:
         return Finished(number, function(item), None)
     except Exception as error:  # noqa: BLE001  the caller handles any error
@@ -94,7 +94,7 @@ def _compute_call(number: int, function: Callable[[Item], Any], item: Item) -> F
 
 
 class Cores(Farm):
-    """A pool of processes on this machine that have imported ``module`` before they begin.
+    """A pool of processes on this machine, each of which has imported ``module`` before its first call.
 
     A thread of its own uses the pool.  An interrupt is raised in the main thread at any line, and one that is raised
     where the main thread holds a lock of the pool would leave it locked, so that the program could never end.
@@ -103,7 +103,7 @@ class Cores(Farm):
     def __init__(self, processes: int, module: str) -> None:
         start_importing(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        # Closing this end of the pipe ends the processes.
+        # Closing this end of the pipe makes the processes exit.
         self._held, self._leash = Pipe(duplex=False)
         self._pool = self._new(processes)
         self._is_closed = False
@@ -116,13 +116,13 @@ class Cores(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; at most ``room`` calls are computed or wait at the same time.
+        """Yield the results of all calls; at most ``room`` calls are computed or queued at the same time.
 
         If the process of a call dies, the call is repeated once in a pool of its own: the death breaks a whole pool,
         and not all of its calls cause it. The process from which others are forked may die too; it is then restarted.
         """
         queue = enumerate(items)
-        # An interrupt leaves these queues, which are not written in Python, as they are.
+        # An interrupt cannot damage these queues, because they are not written in Python.
         calls = SimpleQueue[_Call | None]()
         finished = SimpleQueue[Finished | BaseException]()
         Thread(
@@ -150,10 +150,10 @@ class Cores(Farm):
         calls: SimpleQueue[_Call | None],
         finished: SimpleQueue[Finished | BaseException],
     ) -> None:
-        """Compute ``calls`` until None, and put each answer into ``finished``, or an error that ends all calls."""
+        """Compute ``calls`` until None arrives; put each answer, or an error that ends all calls, into ``finished``."""
 
         def hand_over(call: _Call, future: Future[Any]) -> None:
-            """Hand over the answer to a call, or the call itself if it is to be repeated."""
+            """Pass on the answer to a call, or the call itself if it has to be repeated."""
             if future.cancelled():
                 return
             if isinstance(future.exception(), BrokenProcessPool):
@@ -183,7 +183,7 @@ class Cores(Farm):
     def _answer_alone(
         self, number: int, function: Callable[[Item], Result], item: Item
     ) -> Finished:
-        """Compute a call in a separate pool, so that a crash of its process ends no other call."""
+        """Execute a call in a pool of its own, so that a crash of its process affects no other call."""
         pool, future = self._begin_pool(1, function, item)
         answer = _make_answer(number, future)
         pool.shutdown(wait=False)
@@ -223,7 +223,7 @@ def _make_answer(number: int, future: Future[Any]) -> Finished:
 
 
 def _begin_work(held: Connection) -> None:
-    """End this process when the other end of ``held`` is closed; an interrupt ends it without a message."""
+    """Exit this process when the other end of ``held`` is closed; an interrupt ends the process without a message."""
     # A spawned process still has this handler; in a forked process, `interruptible` has already changed it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -237,19 +237,19 @@ def _begin_work(held: Connection) -> None:
 
 
 def start_importing(processes: int, module: str) -> None:
-    """Let one process import ``module`` in the background; workers are later forked from this process.
+    """Import ``module`` in one background process, from which the workers are later forked.
 
     Call this as early as it is known that several processes will be needed; for a single one it does nothing.
     """
     if processes > 1:
-        # numpy reads this variable when it is imported; threads would compete with processes for the cores.
+        # numpy reads this variable when it is imported; numpy threads would compete with the processes for the cores.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
             _start_server(module)
 
 
 def _start_server(module: str) -> None:
-    """Start the process from which others are forked; an interrupt ends it without a message even while it imports."""
+    """Start the process from which others are forked; an interrupt ends it silently even during its imports."""
     # Windows has no fork server.
     from multiprocessing import forkserver, resource_tracker
 
@@ -263,12 +263,12 @@ def _start_server(module: str) -> None:
 
 
 def choose_farm(processes: int, module: str) -> Farm:
-    """Return the object that computes calls in a number of processes; for 1, it computes them in this process."""
+    """Return the object that computes calls in the given number of processes; 1 means in this process."""
     return Cores(processes, module) if processes > 1 else Farm()
 
 
 class Cluster(Farm):
-    """A running Dask cluster at the address of its scheduler, which must answer within ``patience`` [s].
+    """A running Dask cluster, given by the address of its scheduler, which must answer within ``patience`` [s].
 
     Raises
     ------
@@ -299,7 +299,7 @@ class Cluster(Farm):
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
     ) -> Iterator[Finished]:
-        """Yield the results of all calls; the scheduler gets at most ``room`` calls at a time.
+        """Yield the results of all calls; at most ``room`` calls are sent to the scheduler at a time.
 
         The scheduler repeats the calls of dead workers.  Calls are submitted in groups of at least half of ``room``,
         since each message costs as much as a call.
@@ -331,7 +331,7 @@ class Cluster(Farm):
 
 
 def _make_cluster_answer(number: int, status: str, result: Any) -> Finished:
-    """Make the answer of a cluster task; the ``result`` of a failed task is its error type, error and traceback.
+    """Convert the outcome of a cluster task; the ``result`` of a failed task is its error type, error and traceback.
 
     The status of a successful task may have changed meanwhile: its worker may have died after it returned the result.
     """

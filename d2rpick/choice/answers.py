@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.run import OpenedRun
 
-# Number of pairs at other energy peaks that may be found inadmissible before the search for a better pair ends.
+# The search for a better pair ends after this many pairs at other energy peaks have been found inadmissible.
 _MOST_REFUSED = 3
 
 
@@ -89,7 +89,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def verified(self) -> bool:
-        """True if the pair is admissible, its grade is not "poor", and its residual is at most 0.5."""
+        """True if the pair is admissible, its grade is not "poor", and its residual is 0.5 or less."""
         residual = self.candidate.residual
         is_kept = residual is None or residual <= POOR_RESIDUAL
         return is_kept and self.decision.grade != POOR
@@ -105,7 +105,7 @@ class PairVerdict(AnswerAtTd):
         return compare_in_flight(decision, self.situation, self.candidate)
 
     def _decide(self, better: Pair | None) -> Decision:
-        """Decide on the pair; ``better`` is a better pair, or None if no better pair is known."""
+        """Return the verdict on the pair; ``better`` is a better pair, or None if no better pair is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
         objections = [text for text in self.reasons if text not in self.remarks]
         decision = decide(
@@ -135,7 +135,7 @@ class PairVerdict(AnswerAtTd):
 
     @cached_property
     def better(self) -> Pair | None:
-        """A better pair whose grade is not "poor", for this td or at the nearest better td; None if there is none."""
+        """A better pair with a grade other than "poor", at this td or the nearest suitable peak; None without one."""
         return None if self._is_refuted else self._good_pair
 
     @cached_property
@@ -161,7 +161,7 @@ class PairVerdict(AnswerAtTd):
 
     @property
     def quality(self) -> Quality:
-        """Grades of the motion and of the vibration of the pair."""
+        """Grades for the motion and for the vibration of the pair."""
         return self.decision.quality
 
     @cached_property
@@ -249,7 +249,7 @@ def _check_order(tr: float, td: float) -> None:
 
 
 class AcceptableWindow(NamedTuple):
-    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` is its fraction of the flight up to td."""
+    """Window of acceptable tr from ``start`` to ``end`` [time]; ``share`` relates its length to the flight up to td."""
 
     start: float
     end: float
@@ -295,7 +295,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def expected(self) -> Expectation | None:
-        """Estimate of the motion after td if the basis is "energy"; None if the basis is another."""
+        """Estimate of the motion after td if the basis is "energy"; otherwise None."""
         if self.situation.basis != "energy":
             return None
         return estimate_time_after(
@@ -319,7 +319,7 @@ class PairSuggestion(AnswerAtTd):
 
     @cached_property
     def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable, equally good tr if the basis is "energy"; None if the basis is another."""
+        """Windows of acceptable, equally good tr if the basis is "energy"; otherwise None."""
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
@@ -343,12 +343,12 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def _good_pair(self) -> Pair | None:
-        """The better pair, if it is clearly better than the recommended pair and its residual is good; else None."""
+        """Another pair, clearly better than the recommended one and with a residual of at most 0.5; otherwise None."""
         return _drop_poor(self.clearly_better)
 
     @cached_property
     def decision_on_better(self) -> Decision | None:
-        """Verdict on the better pair by the rules of ``verify``; None if there is no better pair."""
+        """Verdict on the better pair by the rules of ``verify``; None if no better pair is known."""
         better = self.better_pair
         if better is None:
             return None
@@ -356,7 +356,7 @@ class PairSuggestion(AnswerAtTd):
         return verify_at(examined, better.tr)._decide(None)
 
     def decision_on(self, candidate: Candidate) -> Decision:
-        """Decide on one of the candidates by the rules of ``verify``."""
+        """Return the verdict on one of the candidates by the rules of ``verify``."""
         objections = list_separate_objections(self.candidates, candidate)
         limits = list_exceeded_limits(self.situation, candidate)
         messages = (excess.message for excess in limits)
@@ -380,7 +380,7 @@ class PairSuggestion(AnswerAtTd):
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair, if it is clearly better than the recommended pair; otherwise None.
+        """Another pair that is clearly better than the recommended pair; None if there is none.
 
         Residuals are compared; on basis "energy" the amplitudes of the levels at td.
         """
@@ -398,7 +398,7 @@ class PairSuggestion(AnswerAtTd):
 
 
 def _has_smaller_residual(pair: Pair, candidate: Candidate) -> bool:
-    """Return True if the residual of a pair is smaller than that of a candidate, beyond its uncertainty."""
+    """Return True if the residual of a pair is smaller than that of a candidate by more than its uncertainty."""
     if pair.residual is None or candidate.residual is None:
         return False
     bound = candidate.residual_high
@@ -420,7 +420,7 @@ def decide_with_better_pair(answer: PairSuggestion) -> Decision | None:
 def compare_in_flight(
     decision: Decision, situation: Situation, candidate: Candidate
 ) -> Decision:
-    """Add to the decision on a pair a clearly better pair of the same flight, or else the range of td without one.
+    """Add to the decision on a pair a clearly better pair of the same flight, or the td range in which there is none.
 
     The flight is searched only if another time may be better, and no better pair is known yet.
     """
@@ -443,7 +443,7 @@ def compare_in_flight(
 
 
 def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
-    """Return the pair that is chosen in the flight of a situation; None if its flight is unknown."""
+    """Return the suggestion for the flight of a situation; None if the flight is unknown or allows no choice."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.td.flights import find_longest_flight
 
@@ -461,7 +461,7 @@ def _choose_in_flight(situation: Situation) -> PairSuggestion | None:
 def _choose_in_window(
     history: History, settings: Settings, window: tuple[float, float]
 ) -> PairSuggestion | None:
-    """Return the pair that is chosen in a window for td; None if the record does not allow a choice."""
+    """Return the suggestion for a td in a window; None if the record does not allow a choice."""
     # Imported here to keep start-up fast.
     from d2rpick.choice.td.suggest_td import choose_td
 
@@ -518,14 +518,14 @@ def suggest_at(
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
-    """Return the recommended pair of the nearest energy peak that has one, within the flight; None if no peak has one.
+    """Return the pair recommended at the energy peak closest to td that has such a pair; None if no peak has one.
 
     The record is examined anew at that td, so that the pair is what ``suggest`` recommends for that td.
     """
     start = situation.earliest_tr
     if start is None:
         return None
-    # If the end of the flight is unknown, times after the given td are not tried.
+    # If the end of the flight is unknown, only times up to the given td are tried.
     if situation.flight.end is None and not situation.evidence.span:
         end = situation.td
     else:
@@ -551,7 +551,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def find_good_pair(situation: Situation) -> Pair | None:
-    """Return a pair whose grade is not "poor": the recommended pair at this td or at the nearest better td."""
+    """Return a pair whose grade is not "poor": the recommended one at this td, otherwise a better one at another td."""
     answer = suggest_at(situation)
     if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
@@ -559,7 +559,7 @@ def find_good_pair(situation: Situation) -> Pair | None:
 
 
 def _drop_poor(pair: Pair | None) -> Pair | None:
-    """Return a pair if its residual shows that it is not poor; otherwise None."""
+    """Return a pair if its residual is known and not poor; otherwise None."""
     if pair is None or pair.residual is None or pair.residual > POOR_RESIDUAL:
         return None
     return pair
@@ -586,7 +586,7 @@ def _find_saving_pair(situation: Situation) -> Pair | None:
 
 def _examine_anew(situation: Situation, td: float) -> Situation:
     """Examine the same record at another td, in the same way as at a td given by the user."""
-    # The oscillator is fitted again, but the slow search for the reason of a refusal is omitted.
+    # The oscillator is fitted again, but the slow search for the reason of a refusal is skipped.
     quick = situation.evidence.span is None
     return examine_td(situation.history, td, situation.settings, quick=quick)
 
@@ -681,7 +681,7 @@ def _refuse_switched(situation: Situation) -> None:
 
 
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
-    """Add to the answer for a given td what the search of its flight finds if the pair is not good."""
+    """If the pair for a given td is not good, add the result of searching its flight to the answer."""
     best, decision = answer.chosen, answer.decision
     if best is None:
         choice = _choose_in_flight(answer.situation)
@@ -704,7 +704,7 @@ def verify_run(
     settings: Settings,
     earlier: Situation | None = None,
 ) -> PairVerdict:
-    """Judge one pair (tr, td) of a reference run; ``earlier`` and the errors are those of `verify_in_history`."""
+    """Judge one pair (tr, td) of a reference run; see `verify_in_history` for ``earlier`` and the errors raised."""
     refuse_unsound(reference.history, settings, td, choosing=False)
     verdict = verify_in_history(reference.history, tr, td, settings, earlier)
     _refuse_switched(verdict.situation)

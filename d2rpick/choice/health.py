@@ -34,14 +34,14 @@ MOST_HOURGLASS = 0.10
 MOST_IMBALANCE = 0.10
 # MOST_SLIDING: largest contact energy without friction, as a fraction of the peak internal energy [-].
 # The source of MOST_SLIDING is dynasupport.com/howtos/general/contact-energy.
-# MOST_NEGATIVE_SLIDING: largest size of a negative contact energy, as a fraction of the peak internal energy [-].
+# MOST_NEGATIVE_SLIDING: largest absolute value of a negative contact energy, relative to the peak internal energy [-].
 # A negative contact energy has no physical cause but comes from penetrations; the check by Oasys allows 5 %.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# Largest internal energy that is treated as 0 [energy]; those of LS-DYNA start at 2e-20 per process.
+# Largest internal energy that is treated as 0 [energy]; LS-DYNA energies start at 2e-20 per process.
 _FLOOR: Final = 1e-15
 # Largest internal energy of parts that are ignored, as a fraction of the largest part energy [-].
 _SMALL_PART = 0.01
-# Smallest reference energy at which the energy ratio is used, as a fraction of the peak of the reference energy [-].
+# The energy ratio is used only if the reference energy is at least this fraction of its peak [-].
 # If the reference energy is small, even a small error gives a large energy ratio (source: Altair, Radioss FAQ).
 _COUNTING_REFERENCE = 0.1
 # Code of the warning about an engine version that reports wrong energies.
@@ -50,21 +50,21 @@ WRONG_ENERGY: Final = "engine-wrong-energy"
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
-# _WITHIN: fraction of the record within which a diverged run meets the following three criteria [-].
-# _GAIN: smallest ratio of the kinetic energy of a diverged run to all earlier energies [-].
+# _WITHIN: the criteria below compare a state with all states earlier by more than this fraction of the record [-].
+# _GAIN: smallest ratio of the kinetic energy of a diverged run to the largest earlier energy [-].
 # _SPEED: smallest ratio of the kinetic energy of a diverged run to the internal energy [-].
-# _TORN: smallest growth factor of the internal energy of a diverged run, in which elements are torn [-].
+# _TORN: smallest ratio of the internal energy of a diverged run, whose elements are torn, to its earlier maximum [-].
 # Sound runs do not meet all three criteria of a diverged run, because a load that accelerates a body also deforms it.
 _WITHIN: Final = 1 / 20
 _GAIN, _SPEED, _TORN = 1e9, 1e6, 1e3
-# Smallest number of earlier states with energy needed to recognise a diverged run; first states may be round-off.
+# A diverged run is recognised only after this many states with energy, because the first states may be round-off.
 _FEWEST: Final = 12
-# Largest energy that is treated as zero in any unit system, because energies of LS-DYNA start at 2e-20.
+# Largest energy that is treated as zero in any unit system, because LS-DYNA energies start at 2e-20 [energy].
 _NOTHING: Final = 1e-20
 
 
 class Health(NamedTuple):
-    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if unknown.
+    """Health of a run up to the time ``until``; the fields are the keys of the JSON output, None if a value is unknown.
 
     Shares refer to the peak internal energy of the model; ``part_hourglass_share`` to that of ``part``, the worst of
     the chosen parts.  The energy ratio is the total energy over the initial energy and the external work.  The last
@@ -192,8 +192,8 @@ def _is_unbalanced(health: Health) -> bool:
     )
 
 
-# For each warning about the health of a run: its code, the condition for issuing it, and its text.
-# The internal energy of an LS-DYNA model includes that of eroded elements (ftp.lstc.com, FAQ energy_balance).
+# Code, condition and text of each warning about the health of a run.
+# The internal energy of an LS-DYNA model includes the energy of eroded elements (ftp.lstc.com, FAQ energy_balance).
 _ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
     ("hourglass", lambda h: _is_above(h.hourglass_share, MOST_HOURGLASS),
      f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
@@ -264,9 +264,9 @@ def _find_worst_part(balance: Balance) -> dict[str, Any]:
 
 
 def _find_ratio_range(balance: Balance) -> dict[str, Any]:
-    """Return the range of the energy ratio, as fields of `Health`, while the reference energy is large enough.
+    """Return the range of the energy ratio over the times with a large enough reference energy, as fields of `Health`.
 
-    The ratio is that of the solver, or else computed from the terms.
+    The ratio is that of the solver or, if the files lack it, is computed from the terms.
     """
     ratio = balance.ratio
     total = _compute_total(balance)
@@ -293,7 +293,7 @@ def _find_ratio_range(balance: Balance) -> dict[str, Any]:
 
 
 def _compute_total(balance: Balance) -> Samples | None:
-    """Return the total energy written by the solver, or else the sum of all energies; None if a main one is unknown."""
+    """Return the total energy from the solver, or the sum of all energies; None without internal or kinetic energy."""
     if balance.total is not None:
         return balance.total
     if balance.internal is None or balance.kinetic is None:
@@ -309,7 +309,7 @@ def _compute_total(balance: Balance) -> Samples | None:
 def _measure_window(
     balance: Balance, start: float, end: float, locked: float | None
 ) -> dict[str, Any]:
-    """Return contact, eroded and external energy in the window, relative to the energy there, as fields of `Health`."""
+    """Return the changes of contact and eroded energy, and the work, in the window, relative to its internal energy."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         if balance.time[inside].size:
@@ -417,7 +417,7 @@ def _describe_divergence(history: History) -> str | None:
 
 
 def _has_no_energy(history: History) -> bool:
-    """Return True if the internal energies of the chosen parts and of the model are always 0, or all are negligible."""
+    """Return True if the internal energies of the chosen parts and of the model are all zero or negligible."""
     balance = history.balance
     if balance is None:
         return False

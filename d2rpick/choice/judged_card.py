@@ -52,7 +52,7 @@ def add_deck_bodies(printing: Printing, settings: Settings) -> Printing:
 
 
 def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
-    """Add the times at which the named contact or rigid wall exerts a force, and the closing speed of the parts.
+    """Add the times at which the named contact or rigid wall exerts a force, and the parts' closing speed.
 
     The times follow from the contact force in the file, or else from the part momenta; the speed only from momenta.
     """
@@ -80,7 +80,7 @@ def _add_pushes(printing: Printing, history: History, solver: str) -> Printing:
 def print_pair(
     reference: Reference, situation: Situation, tr: float, printing: Printing
 ) -> PrintedCard | None:
-    """Print the card for ``tr`` and the td of a situation, with a verdict on both; None without parts to switch."""
+    """Print the card for ``tr`` and the td of a situation, with a verdict on both; None if no parts are switched."""
     history = situation.history
     judge = partial(
         verify_run, reference, settings=situation.settings, earlier=situation
@@ -170,7 +170,8 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
     if decision.cure:
         yield f"To improve: {decision.cure}."
     yield f"Expect: {decision.expected}. At worst: {decision.worst_case}."
-    if verdict.situation.at_rest:  # At rest, no energy level has to be matched.
+    # If the parts are at rest, no energy level has to be matched.
+    if verdict.situation.at_rest:
         return
     measures = [
         f"{name} {value:.3f}"
@@ -187,5 +188,5 @@ def _describe_verdict(verdict: PairVerdict, which: str) -> Iterator[str]:
 
 
 def _format_as_sentence(text: str) -> str:
-    """Return a reason with a capital letter and a full stop."""
+    """Return a reason as a sentence, with a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}."

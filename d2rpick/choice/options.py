@@ -29,7 +29,7 @@ _QUANTITIES: Final = {"kinetic_share": "kinetic fraction"}
 
 
 class Limit(NamedTuple):
-    """A limit that a recommended pair must keep. A pair with an unknown value does not keep the limit.
+    """A limit that a recommended pair must meet. A pair whose value is unknown does not meet the limit.
 
     ``quantity`` is a column of judged candidates, or an attribute of the situation at td.  If ``is_lower`` is True, the
     value must not be below the limit, otherwise not above it.
@@ -39,7 +39,7 @@ class Limit(NamedTuple):
     is_lower: bool = False
 
     def is_kept_by(self, values: Any, limit: float) -> Any:
-        """Return True for each of the ``values`` that keeps the limit; NaN is an unknown value, which does not keep it.
+        """Return True for each of the ``values`` that meets the limit; NaN is an unknown value, which does not meet it.
 
         Examples
         --------
@@ -70,7 +70,7 @@ class Limit(NamedTuple):
 
 
 class Use(NamedTuple):
-    """Commands and answers that use an option of a choice, and the limit that it sets.
+    """Commands and answers that use an option of a choice, and the limit that the option sets.
 
     ``limit`` is what its value limits, None if it is not a limit.  ``of_cards``: ``card`` and ``check --history`` have
     the option too.  ``of_sets``: ``parts`` and ``study`` have it too.  ``is_advanced``: the last section of the help
@@ -84,11 +84,11 @@ class Use(NamedTuple):
 
 
 def _describe_use(**use: Any) -> dict[str, Use]:
-    """Return the metadata of a dataclass field that describe how an option is used."""
+    """Return dataclass-field metadata that describe how an option is used."""
     return {"use": Use(**use)}
 
 
-# The class is not frozen, although its objects are never changed, because frozen classes slow start-up by 2 %.
+# The class is not frozen although its objects never change, because frozen classes slow start-up by 2 %.
 @dataclass(init=False, eq=False, repr=False, kw_only=True)
 class ChoiceOptions:
     """The options that define how a pair is chosen and judged; times have the unit of the history.
@@ -166,7 +166,7 @@ class ChoiceOptions:
         "C",
         metadata=_describe_use(of_sets=False, is_advanced=True),
     )
-    # Rigid elements do not limit the time step, so it cannot become smaller than that of the deformable run.
+    # Rigid elements do not limit the time step, so it cannot be smaller than that of the deformable run.
     step_ratio: float | None = make_option(
         "Time step while the parts are rigid, divided by the time step before, 1 or more.  [default: 1]",
         AT_LEAST_ONE,

@@ -62,7 +62,7 @@ class PartOverview(NamedTuple):
 
 
 class ForceOverview(NamedTuple):
-    """A contact or rigid wall, and the intervals (start, end) in which it ``acts`` on parts [time]."""
+    """A contact or rigid wall, and the intervals ``acts`` (start, end) in which it acts on parts [time]."""
 
     name: str
     acts: tuple[tuple[float, float], ...]
@@ -137,7 +137,7 @@ class Overview(NamedTuple):
 
     @property
     def _is_spent(self) -> bool:
-        """True if parts were rigid, and no flight begins after that."""
+        """True if parts were rigid and no flight begins afterwards."""
         last = max((end for _, end in self.rigid), default=None)
         return last is not None and all(
             flight.start < last for _, flight in self.flights
@@ -145,7 +145,7 @@ class Overview(NamedTuple):
 
     @property
     def _doubts(self) -> list[str]:
-        """Reasons why a run with flights can only be used with care."""
+        """Reasons to use a run with flights only with care."""
         health = warn_about_health(self.health) if self.health else ()
         doubts = [caution.message for caution in health]
         if self.rigid:
@@ -274,7 +274,7 @@ def _read_times(first: Legs) -> tuple[Samples, str | None]:
 def _list_notes(
     run: OpenedRun, selection: Selection, refusal: str | None
 ) -> Iterator[str]:
-    """Yield what the readers omitted or assumed, and the message ``refusal`` if the times could not be read."""
+    """Yield notes on what the readers omitted or assumed, and the message ``refusal`` if the times are unreadable."""
     yield from run.left_out
     for database in run.databases:
         yield from _read_notes(database)
@@ -365,7 +365,7 @@ def _find_maximum(energies: Samples) -> float | None:
 
 
 def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
-    """Yield a warning if parts are rigid in some time windows of the run."""
+    """Yield a warning if parts are rigid in some time intervals of the run."""
     if rigid:
         when = _list_times(rigid)
         effect = "part data and internal energy mean nothing there and are not used for the health"
@@ -373,7 +373,7 @@ def _warn_about_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
 
 
 def _list_times(windows: Sequence[Times]) -> str:
-    """Return windows of time as text."""
+    """Return time windows as text."""
     return list_names([f"{start:.6g} to {end:.6g}" for start, end in windows])
 
 
@@ -383,7 +383,7 @@ def _assess_health_of_run(
     flights: Sequence[FreeFlight],
     rigid: Sequence[Times],
 ) -> Health | None:
-    """Return the health of the run outside its rigid windows; None if there are no energies."""
+    """Return the health of the run outside its rigid windows; None if the run has no energies."""
     balance = read_balance(
         run.databases, run.parts, known=history.balance if history else None
     )
@@ -423,7 +423,7 @@ def _read_history(run: OpenedRun, selection: Selection) -> History | None:
 def _warn_about_missing_energy(
     run: OpenedRun, selection: Selection
 ) -> Iterator[Caution]:
-    """Yield a warning if the user has to choose an internal energy, or there is none."""
+    """Yield a warning if the user has to choose an internal energy, or if there is none."""
     try:
         run.history(selection)
     except FormatError as error:
@@ -433,7 +433,7 @@ def _warn_about_missing_energy(
 def _warn_about_flights_outside(
     history: History, flights: Sequence[tuple[str, FreeFlight]]
 ) -> Iterator[Caution]:
-    """Yield a warning for each flight outside the time range of the energies, as in files of different runs."""
+    """Yield a warning for each flight outside the time range of the energies, as in files from different runs."""
     for _, flight in flights:
         last_td = flight.end - LEAST_MARGIN * (flight.end - flight.start)
         if flight.end_seen and last_td > history.end:

@@ -56,7 +56,7 @@ class Reference(NamedTuple):
 def read_reference(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> Reference:
-    """Open the files of a run and read the selected energy; arguments and errors as for `open_run`."""
+    """Open the files of a run and read the selected energy; see `open_run` for the arguments and errors."""
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
@@ -84,7 +84,7 @@ class Settings(ChoiceOptions):
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def run_time_share(self, rigid_fraction: float) -> float | None:
-        """Return the expected run time relative to the reference run [-]; None if the cost share is unknown."""
+        """Return the expected run time relative to the reference run [-]; None if the cost fraction is unknown."""
         share = self.cost_share
         if share is None:
             return None

@@ -59,7 +59,7 @@ _VERSIONS: Final = (
 
 
 class _PipeClosed(Exception):  # noqa: N818  this is not an error: the reader of the pipe needs no more output
-    """Carries BrokenPipeError past click, which would exit with code 1, the exit code of a failed check."""
+    """Exception that carries BrokenPipeError past click, which would exit with code 1, the code of a failed check."""
 
 
 def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -72,7 +72,7 @@ class Documented(click.Command):
     """A command whose help ends with examples."""
 
     def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click passes the argument
-        """Return d2rpick's own help option, because files on the user's system could translate that of click."""
+        """Return d2rpick's own help option, because files on the user's system could change the language of click's."""
         return self._help
 
     @cached_property
@@ -102,12 +102,12 @@ class Documented(click.Command):
         formatter.write("\n" + "\n".join(lines) + "\n")
 
 
-# An option is not suggested if its likeness to a mistyped one is smaller than that of the best by more than this [-].
+# Only options that resemble a mistyped one almost as well as the best match are suggested, to within this limit [-].
 _LESS_ALIKE: Final = 0.1
 
 
 class _CommandGroup(Documented, click.Group):
-    """Loads commands on demand, and turns errors into messages and exit codes."""
+    """Command group that loads commands on demand, and turns errors into messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click passes the argument
         return list(COMMANDS)
@@ -149,7 +149,7 @@ class _CommandGroup(Documented, click.Group):
         if not args and not ctx.resilient_parsing:
             click.echo(ctx.get_help(), err=True)
             ctx.exit(COULD_NOT_RUN)
-        # A copy is kept, because click empties the list of arguments.
+        # A copy is kept, because click empties the original list.
         ctx.meta["d2rpick.command"] = tuple(args)
         return super().parse_args(ctx, args)
 
@@ -160,7 +160,7 @@ class _CommandGroup(Documented, click.Group):
             raise _PipeClosed from error
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
-        except Exception as error:  # The user gets one line for any error.
+        except Exception as error:  # The user gets a one-line message for any error.
             if _is_interrupt(error):
                 raise click.Abort from None
             from d2rpick.cli.output import explain_error
@@ -169,7 +169,7 @@ class _CommandGroup(Documented, click.Group):
                 explain_error(error, ctx.meta.get("d2rpick.history", ()))
             ) from error
 
-    def main(  # type: ignore[override]  # options of click that are not needed are left out
+    def main(  # type: ignore[override]  # options of click that are not needed are omitted
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,
@@ -196,7 +196,7 @@ class _CommandGroup(Documented, click.Group):
 
 
 def _format_usage_error(error: click.UsageError) -> str:
-    """Return the message of a usage error; an unknown option is compared with the options that resemble it most."""
+    """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
     if not isinstance(error, click.NoSuchOption) or not error.possibilities:
         return error.format_message()
     if error.option_name == "--tr":
@@ -216,14 +216,14 @@ def _format_usage_error(error: click.UsageError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Return True if an interrupt caused the error; an interrupt while a class is created becomes another error."""
+    """Return True if an interrupt caused the error; Python replaces an interrupt while it creates a class."""
     while error and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def stop_with_error(message: str) -> NoReturn:
-    """Print an error and end with exit code 2."""
+    """Print an error message and exit with code 2."""
     _tell_error(message)
     sys.exit(COULD_NOT_RUN)
 
@@ -252,7 +252,7 @@ def _print_versions(ctx: click.Context, _: click.Parameter, value: bool) -> None
 
 
 def make_documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
-    """Make a command from a function; its docstring is the help text, with examples at the end."""
+    """Make a command from a function whose docstring is the help text, with examples at the end."""
 
     def made(function: Any) -> _Made:
         help_text, _, examples = cleandoc(function.__doc__).partition(

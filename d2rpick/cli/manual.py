@@ -1,4 +1,4 @@
-"""Build the manual page d2rpick(1) from the help: ``python -m d2rpick.cli.manual > d2rpick.1``."""
+"""Build the manual page d2rpick(1) from the help texts: ``python -m d2rpick.cli.manual > d2rpick.1``."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _write_item(name: str, text: str) -> tuple[str, ...]:
 
 
 def _write_text(text: str) -> str:
-    r"""Escape a line for roff, so that backslashes and hyphens appear as typed and no line is read as a request.
+    r"""Escape a line for roff, so that backslashes and hyphens appear as typed and no line becomes a request.
 
     Examples
     --------

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _NEEDED: Final = {"required": True}
 
-# Columns of the solver tables, keyed by kind of table; each table also has the column time_s.
+# Columns of the solver tables, keyed by type of table; each table also has the column time_s.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
     "run": ("z_m", "y_m", "vz_mps", "vy_mps"),

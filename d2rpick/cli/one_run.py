@@ -183,7 +183,7 @@ def suggest(
         times = options.write_times(td=td, td_window=td_window)
         output.answer(answer, question=question.repeated._replace(times=times))
         decision = answer.decision
-    # The best pair for a given td is shown even if it is poor; the answer and the card then say so.
+    # The best pair for a given td is shown even if it is poor; in this case, the answer and the card say so.
     min_quality = request.min_quality or ("poor" if td is not None else "fair")
     _finish_answer(output, question, decision, min_quality)
 
@@ -194,7 +194,7 @@ def _finish_answer(
     decision: VerdictOnPair | None,
     min_quality: str,
 ) -> None:
-    """Exit with code 1 if the verdict is below ``min_quality``, or if a deck that was given was not used."""
+    """Exit with code 1 if the verdict is below ``min_quality``, or if a given deck was not used."""
     if question.unused_deck:
         output.finish_without_deck(question.unused_deck)
     output.finish_by_verdict(decision, min_quality)
@@ -508,7 +508,7 @@ def plan(
 
 
 def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
-    """Return the cautions of the card that the plan lacks: about unverified windows, and about the card itself."""
+    """Return the cautions about the card that the plan does not contain, such as those about unverified windows."""
     if card is None:
         return []
     failed = tuple(
@@ -524,7 +524,7 @@ def _select_new_cautions(card: JudgedCard | None, plan: Plan) -> list[Caution]:
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
-    """Refuse, before a file is opened, to copy a deck that is not given, or to write a card that switches no parts."""
+    """Before a file is opened, refuse to copy a deck that is not given or to write a card that switches no parts."""
     if folder is not None and request.deck is None:
         raise ArgumentError(
             "--write-deck needs `deck`, the deck that is copied with the cards"
@@ -536,7 +536,7 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
 ) -> tuple[str, bool]:
-    """Write the copy of the deck, and check the copy against the history.
+    """Write the copy of the deck and check it against the history.
 
     Returns
     -------

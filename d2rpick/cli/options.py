@@ -1,4 +1,4 @@
-"""Make the options of the commands from the tables of requests, and write the settings and the command line."""
+"""Make the command-line options from the argument tables of the API, and print the settings and the command line."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
 
 WINDOW = tuple[float, float] | None
-Decorated = Any  # Type of a command function; click's decorators have no narrower type.
+# Type of a command function; click's decorators have no more specific type.
+Decorated = Any
 TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
-# Stands for the positional argument, because an option has the same name.
+# Name of the positional argument, in capitals because some commands have an option of the same name.
 HISTORY: Final = "HISTORY"
 ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
@@ -76,7 +77,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _PAIRS: Final = ("td_window",)
 _ASKS_FOR_SETTINGS: Final = "--show-settings"
-# Key in the context of click for a flag that is True if only the settings are to be shown.
+# Key in the context of click for a flag that is True if only the settings are shown.
 _SETTINGS_ONLY: Final = "d2rpick.settings-only"
 _SOURCES: Final = {
     ParameterSource.COMMANDLINE: "command line",
@@ -86,10 +87,10 @@ _SOURCES: Final = {
 
 
 class Command(Documented):
-    """A command that can show its settings instead of running, and names options in messages about arguments."""
+    """A command that can show its settings instead of running, and that names options in messages about arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the command line. Options set neither there nor in the environment come from the settings file."""
+        """Read the command line. Options set neither there nor in the environment are taken from the settings file."""
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         ctx.meta[_SETTINGS_ONLY] = _ASKS_FOR_SETTINGS in args
@@ -109,7 +110,7 @@ class Command(Documented):
         return remaining
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the parameters; no parameter is required if only the settings are to be shown."""
+        """Return the parameters; none of them is required if only the settings are shown."""
         parameters = super().get_params(ctx)
         if ctx.meta.get(_SETTINGS_ONLY):
             return [_make_optional(parameter) for parameter in parameters]
@@ -118,7 +119,7 @@ class Command(Documented):
     def format_options(
         self, ctx: click.Context, formatter: click.HelpFormatter
     ) -> None:
-        """Write the help of the options in groups by subject."""
+        """Write the help of the options, grouped by subject."""
         shown_options = (
             parameter
             for parameter in self.get_params(ctx)
@@ -160,14 +161,14 @@ class Command(Documented):
 
 
 def _make_optional(parameter: click.Parameter) -> click.Parameter:
-    """Return a copy of a parameter that is not required."""
+    """Return a copy of a parameter in which the parameter is not required."""
     optional = copy(parameter)
     optional.required = False
     return optional
 
 
 class Either(click.Option):
-    """An option that excludes others. If one of them is on the command line, its environment variable is ignored."""
+    """An option that excludes others. If one of these is on the command line, its environment variable is ignored."""
 
     def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -176,7 +177,7 @@ class Either(click.Option):
     def consume_value(
         self, ctx: click.Context, opts: Any
     ) -> tuple[Any, ParameterSource]:
-        """Return the value and its source. Options on the command line already have the value that click read."""
+        """Return the value and its source. click has already read the values of options on the command line."""
         value, source = super().consume_value(ctx, opts)
         typed = (
             ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
@@ -195,7 +196,7 @@ def make_command(function: Decorated) -> click.Command:
 def add_options(
     *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **overrides: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Give a command the options of tables. The command gets one object per table, with the table's name in lower case.
+    """Give a command the options of tables. The command receives one object per table, named like the table.
 
     Parameters
     ----------
@@ -305,7 +306,7 @@ def _make_decorator(
 def make_click_option(
     name: str, entry: Option, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of click from an entry of a table."""
+    """Make a click option from a table entry."""
     about: dict[str, Any] = {
         "help": replace_arguments(entry.help),
         "metavar": entry.metavar,
@@ -336,7 +337,7 @@ def make_click_option(
 def make_time_option(
     name: str, text: str, **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command for a time, or for a time window."""
+    """Make an option of a single command for a time or a time window."""
     pair = arguments.get("pair", False)
     required = arguments.pop("required", False)
     return make_click_option(
@@ -349,7 +350,7 @@ def make_time_option(
 def make_file_option(
     name: str, text: str, metavar: str = "FILE", **arguments: Any
 ) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file, or ``many`` files if the option is repeated.
+    """Make an option of a single command that names a file, or ``many`` files if the option is repeated.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
@@ -363,7 +364,7 @@ def make_file_option(
 
 
 def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
-    """Read the windows in a file with lines 'tr td'."""
+    """Read the windows from a file with lines 'tr td'."""
     from d2rpick.api.arguments import read_windows
 
     with click.open_file(file, encoding="utf-8", errors="replace") as stream:
@@ -371,7 +372,7 @@ def read_windows_in(file: str) -> Sequence[tuple[float, float]]:
 
 
 def open_judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; None if no history is given."""
+    """Open the history that is used to judge cards; None if no history is given."""
     if not request.history:
         return None
     # Imported here to keep start-up fast.
@@ -384,7 +385,7 @@ def _keep_in_context(ctx: click.Context, option: click.Parameter, value: bool) -
     ctx.meta[f"d2rpick.{make_option_name(option.name or '')}"] = value
 
 
-# Options that every command accepts but no command uses itself; they are kept in the context of click.
+# Options that every command accepts but does not use itself; they are kept in the context of click.
 _FLAGS: Final = [
     _share_option(
         click.option(
@@ -410,7 +411,7 @@ _FLAGS: Final = [
 
 
 def repeat_command() -> list[str]:
-    """Return the typed command line, preceded by the environment variables that set options.
+    """Return the command line as typed, preceded by the environment variables that set options.
 
     The line may overwrite the files that it has written, so that it can be run again.
     """
@@ -430,7 +431,7 @@ def repeat_command() -> list[str]:
 
 
 def write_times(**values: Any) -> tuple[str, ...]:
-    """Return options as typed; those without a value are left out.
+    """Return options as typed; options without a value are omitted.
 
     Examples
     --------

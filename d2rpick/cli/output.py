@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-# Smallest width of a terminal for which a result is wrapped [columns].
+# Smallest terminal width to which a result is wrapped [columns].
 _NARROWEST: Final = 40
 # Output formats, keyed by the suffix of the file name.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
@@ -50,7 +50,7 @@ _TRUNCATED: Final = "truncated-input"
 _TRUNCATION: Final = "ends within"
 
 
-# Output forms that already explain why nothing is recommended.
+# Output formats that already explain why nothing is recommended.
 IN_WORDS: Final = {"table", "markdown"}
 
 
@@ -71,7 +71,7 @@ class VerdictOnPair(Protocol):
 
 @dataclass(eq=False, repr=False)
 class Output:
-    """Writes results to stdout or a file, and messages to stderr; the files in ``inputs`` are never overwritten."""
+    """Output that writes results to stdout or a file, and messages to stderr; it never overwrites ``inputs``."""
 
     plot: str | None = make_option(
         "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
@@ -111,11 +111,11 @@ class Output:
 
     @property
     def columns(self) -> int:
-        """Width of the terminal that shows the result [columns]; 0 if no terminal shows the result."""
+        """Width of the terminal on which the result is shown [columns]; 0 if the result is not shown on a terminal."""
         return 0 if self.file else measure_columns(sys.stdout) or 0
 
     def beside(self, *inputs: str | None) -> Output:
-        """Return an output that protects these inputs; raise D2RPickError if it would overwrite one of them."""
+        """Return an output that protects these inputs; raise D2RPickError if it would overwrite an input."""
         output = replace(
             self, inputs=tuple(name for name in inputs if name not in (None, "-"))
         )
@@ -146,7 +146,7 @@ class Output:
         return output
 
     def check(self, cards: Cards, *, by_itself: bool = False) -> None:
-        """Refuse card options if no card is requested, either ``by_itself`` or in a page."""
+        """Refuse card options if no card is requested, either ``by_itself`` or on a page."""
         if cards.given and not (
             by_itself or self.output_format == "card" or self.report is not None
         ):
@@ -155,7 +155,7 @@ class Output:
             )
 
     def shown(self, **further: Any) -> DisplayOptions:
-        """Return what an output form shows in addition to the answer."""
+        """Return what to show in addition to the answer."""
         from d2rpick.report.formats import DisplayOptions
 
         meta = click.get_current_context().meta
@@ -168,7 +168,7 @@ class Output:
         return display._replace(width=self.columns or display.width)
 
     def answer(self, answer: Answer, below: str = "", **display_options: Any) -> None:
-        """Write an answer in the requested form."""
+        """Write an answer in the requested format."""
         now = self.shown(**display_options)
         text = name_options_and_wrap(
             answer.text(self.output_format, now), self.output_format, now.width
@@ -185,14 +185,14 @@ class Output:
             self.write(self.report, encode_text(replace_arguments(page())))
 
     def finish(self, *, objection: bool) -> None:
-        """Exit with code 1 if the answer reports a failure, unless ``--exit-zero`` is given."""
+        """Exit with code 1 if the answer is a failure, unless ``--exit-zero`` is given."""
         if objection and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
     def finish_by_verdict(
         self, decision: VerdictOnPair | None, min_quality: str
     ) -> None:
-        """Exit with code 1 if there is no pair, or if its grade is below ``min_quality``, which a message names."""
+        """Exit with code 1 if there is no pair or if its grade is below ``min_quality``; a message states the grade."""
         if decision is None or decision.reaches(min_quality):
             self.finish(objection=decision is None)
             return
@@ -204,7 +204,7 @@ class Output:
         self.finish(objection=True)
 
     def spare(self, inputs: Iterable[str]) -> None:
-        """Raise D2RPickError if an output file would replace an input that is known only after reading."""
+        """Raise D2RPickError if an output file would replace an input that became known only after reading."""
         further = replace(self, inputs=tuple(inputs))
         for name in (self.file, self.plot, self.report):
             if name is not None:
@@ -259,7 +259,7 @@ class Output:
             click.echo(content, nl=False)
 
     def card(self, judged_card: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
-        """Write the card of an answer with its cautions; return False if there is no card or if a window fails."""
+        """Write the card of an answer with its cautions; return False if there is no card or a window is rejected."""
         if judged_card is None:
             self.content(b"")
             return False
@@ -268,7 +268,7 @@ class Output:
         return judged_card.passed
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
-        """Print notes on what a reader omitted, and the warnings."""
+        """Print the warnings, and notes on what a reader omitted."""
         if self.quiet:
             return
         listed_cautions = list(cautions)
@@ -280,7 +280,7 @@ class Output:
             tell(f"warning: {caution.code}: {caution.message}")
 
     def finish_without_deck(self, deck: str) -> None:
-        """Exit with code 1, because the user named a deck that belongs to another model and was not used."""
+        """Exit with code 1, because the deck that the user named belongs to another model and was not used."""
         if not self.exit_zero:
             tell(
                 f"d2rpick: exit code {OBJECTION}: {deck} is not the deck of this run, so the answer does not use it; "
@@ -303,7 +303,7 @@ class Output:
 
 
 def _check_report(name: str | None) -> None:
-    """Raise D2RPickError if the file name of a report implies another format than HTML."""
+    """Raise D2RPickError if the file name of a report implies a format other than HTML."""
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
@@ -313,7 +313,7 @@ def _check_report(name: str | None) -> None:
 
 
 def _find_implied_format(name: str) -> str | None:
-    """Return the format that the file name of a result implies, if the command has it and no format was given."""
+    """Return the format that the file name of a result implies, if the command supports it and no format was given."""
     ctx = click.get_current_context()
     is_given = (
         ctx.get_parameter_source("output_format")
@@ -334,7 +334,7 @@ def _find_implied_format(name: str) -> str | None:
 
 
 def measure_columns(stream: TextIO) -> int | None:
-    """Return the width of a terminal, limited to a readable width; None if the stream is not a terminal."""
+    """Return the width of a terminal, limited to a readable value; None if the stream is not a terminal."""
     columns_set = os.environ.get("COLUMNS", "")
     try:
         if columns_set.isdecimal():
@@ -349,7 +349,7 @@ def measure_columns(stream: TextIO) -> int | None:
 
 
 def tell(message: str) -> None:
-    """Print a message to stderr; it names options instead of arguments, and contains no control codes.
+    """Print a message to stderr, with options in place of argument names and without control codes.
 
     The message is one line; on a terminal it is wrapped, but never in a log, where ``COLUMNS`` may be set as well.
     """
@@ -363,7 +363,7 @@ def tell(message: str) -> None:
 
 
 def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
-    """Return any error as one line that names options instead of arguments; ``--debug`` prints its traceback.
+    """Return any error as one line with options in place of argument names; ``--debug`` prints its traceback.
 
     An unforeseen error names no input, so that ``inputs`` are added.
     """
@@ -377,7 +377,7 @@ def explain_error(error: BaseException, inputs: Sequence[str] = ()) -> str:
 
 
 def encode_text(text: str) -> bytes:
-    """Encode a string. Characters that no encoding can write, as in some file names, are replaced."""
+    """Encode a string. Characters that cannot be encoded, as in some file names, are replaced."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
@@ -398,7 +398,7 @@ def name_options_and_wrap(text: str, form: str, width: int = 0) -> str:
 
 
 def check_switched(purpose: str, request: Request, cards: Cards) -> None:
-    """Refuse a card that switches no parts, before a file is opened."""
+    """Before a file is opened, refuse a card that switches no parts."""
     if not (request.part or cards.node):
         problem = f"{purpose} needs --part, the parts to switch (Radioss: --node, their main nodes)"
         way_to_pass = "d2rpick card --tr T --td T --part IDS --history FILE"
@@ -415,7 +415,7 @@ def open_with_output(
     """
     from d2rpick.api.asked import open_requested_run
 
-    request.selection()  # This call raises an error for contradictory options before a file is opened.
+    request.selection()  # This call raises an error for contradictory options before any file is opened.
     with show_reading(request.history, quiet=output.quiet):
         run = open_requested_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

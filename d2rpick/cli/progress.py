@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
-_PERIOD: Final = 1.0  # Time before the first progress line, and between two lines [s].
+# Time before the first progress line and between progress lines [s].
+_PERIOD: Final = 1.0
 
 
 @contextmanager
@@ -53,17 +54,17 @@ def show_computing(*, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
 
 
 class Count:
-    """The number of finished runs out of ``total``; ``taken`` of these results come from an earlier study."""
+    """Number of finished runs out of ``total``; ``taken`` of their results come from an earlier study."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self.taken = total, 0, -1
 
     def tell(self, done: int) -> None:
-        """Set the number of finished runs; the first call gives the number of results taken from an earlier study."""
+        """Set the number of finished runs; in the first call, this is the number of results from an earlier study."""
         self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
-        """Describe the progress after ``seconds``, and the remaining time at this pace."""
+        """Describe the progress after ``seconds``, and the remaining time at the current pace."""
         computed = self.done - max(self.taken, 0)
         if computed:
             remaining = f", {_format_duration(seconds / computed * (self.total - self.done))} left"
@@ -108,7 +109,7 @@ def is_on_terminal() -> bool:
 def show_progress(
     say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD
 ) -> Iterator[None]:
-    """Show on a terminal the text that ``say`` returns for the elapsed seconds, unless ``quiet``."""
+    """While code runs, show on a terminal the text that ``say`` returns for the elapsed seconds, unless ``quiet``."""
     if quiet or not is_on_terminal():
         yield
         return
@@ -130,7 +131,7 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
     line, seconds = "", 0.0
     while not done.wait(period):
         seconds += period
-        # A line that wraps could not be erased.
+        # A line that wraps could not be erased completely.
         room = shutil.get_terminal_size().columns - 1
         previous_line = line
         line = say(seconds)[-room:]

@@ -90,7 +90,7 @@ def drive(
     output: Output,
     **driving_options: Any,
 ) -> None:
-    r"""Compute a Radioss run that switches itself: no reference is needed.
+    r"""Compute a Radioss run that needs no reference run, because d2rpick switches the parts as it proceeds.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  The parts fly when no force has acted on them for
     the time --wait.  A rigid probe run then finds the next contact.  The run continues deformable from the margin
@@ -244,7 +244,7 @@ def first(
     output_dir: str,
     output: Output,
 ) -> None:
-    """Write a copy of DECK whose first run switches itself: no reference run is needed.
+    """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
     force.  For Radioss, the copy contains restart segments that sensors end, and the missing rigid bodies.  For

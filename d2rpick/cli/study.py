@@ -176,7 +176,7 @@ def _list_sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
 
 def _is_unmatched_pattern(name: str) -> bool:
-    """Return True for a name with wildcards that is not itself a file or folder and matches none."""
+    """Return True for a name with wildcards that is not a file or folder and matches nothing."""
     return any(sign in name for sign in "*?[") and not os.path.lexists(name)
 
 
@@ -205,7 +205,7 @@ def _read_list(name: str) -> Iterator[str]:
 
 
 def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
-    """Raise D2RPickError if a result (``written`` by its option) would overwrite the file of ``--resume``."""
+    """Raise D2RPickError if a result would overwrite the file of ``--resume``; the keys of ``written`` are options."""
     if name is None:
         return
     for option, file in written.items():
@@ -220,7 +220,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
 
 
 def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
-    """Return the number of runs whose rows are taken from an earlier study, and print it."""
+    """Print and return the number of runs whose rows are taken from an earlier study."""
     if ledger is None:
         return 0
     known_count = ledger.taking(sources)
@@ -232,7 +232,7 @@ def _count_known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) 
 def _choose_farm(
     jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool
 ) -> Farm:
-    """Choose where to compute a number of calls; a single call needs no other process."""
+    """Choose where the given number of calls is executed; a single call needs no separate process."""
     from d2rpick.base import workers
 
     if scheduler and calls:

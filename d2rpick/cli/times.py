@@ -1,4 +1,4 @@
-"""Define options for times of a run. A time with a unit stays a string until the unit of the run is known."""
+"""Define options for times of a run. A time with a unit remains a string until the unit of the run is known."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from d2rpick.api.request import Request
 
-# Commands that compute runs in SI units, so that their times are in seconds.
+# Commands that compute runs in SI units and therefore take times in seconds.
 _IN_SECONDS = ("rollover",)
 # Name of the argument that contains the files of one run.
 _ONE_RUN = "history"
@@ -85,7 +85,7 @@ def _convert(
 
 
 def _find_unit(ctx: click.Context) -> tuple[str, str]:
-    """Return the time unit of a command's run (empty if unknown), and the source that should name the unit."""
+    """Return the time unit of a command's run, empty if unknown, and the source that should name the unit."""
     if ctx.command.name in _IN_SECONDS:
         return "s", ""
     runs = _list_runs(ctx)
@@ -117,7 +117,7 @@ def _list_runs(ctx: click.Context) -> Sequence[Sequence[str]]:
 
 
 def _make_reading_request(ctx: click.Context) -> Request:
-    """Return the options of the command line that define how files are read, as a request."""
+    """Make a request from the command-line options that control how the history is read."""
     from d2rpick.api.request import Request
 
     return Request(

@@ -1,4 +1,4 @@
-"""Define the kinds of option values, their completion by the shell, and their defaults from a settings file."""
+"""Define the types of option values, their completion by the shell, and their defaults from a settings file."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ else:
 
 CARDS: Final = tuple(list_options(Cards))
 _PAIR: Final = 2  # Number of values of an option whose value is a pair.
-# Options that apply only with another option; settings may also set them for commands that lack it.
+# Options that apply only in combination with others; settings may set them even for commands that lack the others.
 _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
     "weights": ("deck",),
     "step_ratio": ("cost_share", "deck"),
@@ -111,7 +111,7 @@ class File(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002  click passes the argument
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Let the shell complete the name."""
+        """Request completion of the name by the shell."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
@@ -122,11 +122,11 @@ class OutputFile(File):
 
 
 class Program(click.types.StringParamType):
-    """A command to be started, or the address of a computing cluster; a settings file must not set either."""
+    """A command to be started, or the address of a computing cluster; a settings file may set neither."""
 
 
 class CompletedText(click.types.StringParamType):
-    """A text that the shell completes from a list of names."""
+    """A text that the shell completes from a list of possible values."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  subclasses use the argument
         """Return the names to choose from, each with a description."""
@@ -138,7 +138,7 @@ class CompletedText(click.types.StringParamType):
         param: click.Parameter,  # noqa: ARG002  click passes the argument
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Offer the names that begin with this prefix, except names that a shell would split."""
+        """Offer the names that begin with this prefix, except names that the shell would split."""
         import re
 
         from click.shell_completion import CompletionItem
@@ -151,7 +151,7 @@ class CompletedText(click.types.StringParamType):
 
 
 class Names(CompletedText):
-    """Names, separated by semicolons in an environment variable, because names may contain blanks."""
+    """Names; semicolons separate them in an environment variable, because names may contain spaces."""
 
     envvar_list_splitter = ";"
 
@@ -175,7 +175,7 @@ class PartNames(Names):
 
 
 class RuleIds(CompletedText):
-    """Ids of the rules of check."""
+    """Ids of the rules of ``check``."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
         """Return the rules with their summaries."""
@@ -192,22 +192,22 @@ class RuleIds(CompletedText):
 
 
 class ChannelNames(Names):
-    """Names of channels, completed from the history on the command line."""
+    """Names of channels, completed from the history that is named on the command line."""
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:
-        """Return the channels in the files on the command line; blanks become underscores, with the same meaning."""
+        """Return the channels in the files on the command line; spaces become underscores, which are equivalent."""
         run = _open_typed_run(ctx)
         return [(name.replace(" ", "_"), "") for name in (run.channels if run else ())]
 
 
 def _open_typed_run(ctx: click.Context) -> Run | None:
-    """Open the files on the command line; None if they are not a run."""
+    """Open the files named on the command line; None if they are not a run."""
     from pathlib import Path
 
     from d2rpick.api.runs import read
     from d2rpick.base.errors import D2RPickError
 
-    # click has not read any argument yet when it completes an option.
+    # click has not yet read any argument when it completes an option.
     words = ctx.meta.get("d2rpick.command", ())[1:]
     try:
         return read([word for word in words if Path(word).exists()])
@@ -223,13 +223,13 @@ class SolverName(CompletedText):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str:
-        """Return the name, or fail with the allowed names."""
+        """Return the name of a solver, or fail with the allowed names."""
         if value not in list_solvers():
             self.fail(explain_unknown_solver(value), param, ctx)
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Return the names of the solvers for the help."""
+        """Return the names of the solvers, as shown in the help."""
         return f"[{'|'.join(list_solvers())}]"
 
     def offer(self, ctx: click.Context) -> Iterable[tuple[str, str]]:  # noqa: ARG002  other subclasses use the argument
@@ -251,7 +251,7 @@ _NAMED: Final = {
 
 
 def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
-    """Return the click type that reads a kind of value."""
+    """Return the click type that reads this type of value."""
     if isinstance(kind, str):
         return _NAMED[kind]
     if isinstance(kind, range):
@@ -264,7 +264,7 @@ def choose_click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
 def read_settings(
     ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str
 ) -> dict[str, Any]:
-    """Return the option values, keyed by name, in the ``table`` of settings that was read from ``source``.
+    """Return the option values, keyed by name, from the settings ``table`` that was read from ``source``.
 
     Keys at the top apply to all commands, keys in a table of a command's name to that command.  ``without`` is the
     context with the command line and the environment: settings that these exclude are ignored.
@@ -297,7 +297,7 @@ def read_settings(
 def _list_given_settings(
     command: click.Command, table: Mapping[str, object], source: str
 ) -> Iterator[tuple[click.Option, object, str]]:
-    """Yield the options of a command in the settings, with value and position; refuse unknown keys."""
+    """Yield each option of a command that the settings contain, with its value and position; refuse unknown keys."""
     tables = {
         name: entry for name, entry in table.items() if isinstance(entry, Mapping)
     }
@@ -331,7 +331,7 @@ def _list_given_settings(
 def _read_value(
     ctx: click.Context, option: click.Option, value: Any, position: str
 ) -> Any:
-    """Read the value of an option; relative file names start from the folder of the settings."""
+    """Read the value of an option; relative file names are relative to the folder of the settings file."""
     _refuse_dangerous(option, position)
     has_list = option.multiple or option.nargs > 1
     values = value if has_list and isinstance(value, list) else [value]
@@ -357,10 +357,11 @@ def _read_value(
 
 
 def _refuse_dangerous(option: click.Option, position: str) -> None:
-    """Refuse to start a program or write a file by settings, because another person may have written them."""
+    """Refuse settings that start a program or write a file, because another person may have written them."""
     if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
         reason = "programs, output files and overwrite are never taken from a file"
-    elif not option.expose_value:  # Options that are not exposed concern only one call, such as --help and --debug.
+    elif not option.expose_value:
+        # click does not expose options for a single call, such as --help and --debug.
         reason = "this is never taken from a file"
     else:
         return
@@ -370,7 +371,7 @@ def _refuse_dangerous(option: click.Option, position: str) -> None:
 
 
 def is_of_kind(option: click.Option, value: object) -> bool:
-    """Return True if a single value from a TOML file has the kind of the option."""
+    """Return True if a single value from a TOML file has the type of the option."""
     if option.is_flag or isinstance(value, bool):
         return option.is_flag and isinstance(value, bool)
     if isinstance(option.type, File):
@@ -383,7 +384,7 @@ def is_of_kind(option: click.Option, value: object) -> bool:
 
 
 def _name_expected_kind(option: click.Option) -> str:
-    """Return the name of the kind of value that an option takes."""
+    """Return the name of the type of value that an option takes."""
     if option.is_flag:
         return "true or false"
     if isinstance(option.type, File):
@@ -416,7 +417,7 @@ def _get_source(ctx: click.Context, name: str | None) -> ParameterSource | None:
 
 
 def list_words(ctx: click.Context) -> Sequence[str]:
-    """Return the settings as command-line options, spelled as a user types them."""
+    """Return the settings as command-line options, as a user would type them."""
     of_settings = (
         parameter
         for parameter in ctx.command.params

@@ -1,4 +1,4 @@
-"""Read LS-DYNA decks and Radioss runs: cards with file, line and column, switching windows, parts and elements.
+"""Read LS-DYNA decks and Radioss runs: cards with file, line and column, rigid windows, parts and elements.
 
 This page finds the main decks of a folder and reads the parts of a deck from its path.
 """
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
-# Number of bytes that are searched to recognise a deck; titles and comments may precede its first keyword.
+# Number of bytes in which a deck is recognised; titles and comments may precede its first keyword.
 _HEAD = 64 * 1024
 
 
 def read_inventory(path: str) -> Inventory:
-    """Read the parts and elements of a main deck and of its includes.
+    """Read the parts and elements of a main deck and its includes.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    # The modules are imported here, because they import numpy.
+    # These modules are imported here, because they import numpy.
     from d2rpick.deck import (
         ls_dyna_inventory,
         radioss_files,
@@ -55,7 +55,7 @@ def read_inventory(path: str) -> Inventory:
 
 
 def find_time_unit(path: str) -> str:
-    """Return the time unit that a Radioss run names for deck and computation; empty if there is none or two differ.
+    """Return the time unit that a Radioss deck gives for itself and the computation; empty unless both have the same.
 
     Decks of LS-DYNA name no units.
 
@@ -76,7 +76,7 @@ def find_time_unit(path: str) -> str:
 
 
 def find_main_decks(folder: str) -> list[str]:
-    """Return the paths of the main decks in a folder and in its subfolders.
+    """Return the paths of the main decks in a folder and its subfolders.
 
     A main deck contains ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
     folder includes it. Hidden files and folders are ignored.
@@ -103,7 +103,7 @@ def find_main_decks(folder: str) -> list[str]:
 
 
 def find_decks_of_run(folder: str) -> list[str]:
-    """Return the paths of the main decks with parts in the folder of a run.
+    """Return the paths of the main decks with parts that are in the folder of a run.
 
     Restart decks and files that contain only switching cards have none. A Radioss run is represented by its starter
     deck.
@@ -139,7 +139,7 @@ def _has_parts(path: str) -> bool:
 
 
 def _list_includes(path: str) -> list[str]:
-    """Return the names of the files that a deck includes; empty if the deck cannot be read, which its check reports."""
+    """Return the names of the files that a deck includes; empty for an unreadable deck, which its check reports."""
     # Imported here to keep start-up fast.
     from d2rpick.deck import radioss_files, reader
 
@@ -154,7 +154,7 @@ def _list_includes(path: str) -> list[str]:
 
 
 def _list_files(folder: str) -> Iterator[str]:
-    """Yield the paths of all visible files in a folder and in its subfolders."""
+    """Yield the paths of all visible files in a folder and its subfolders."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     for root, folders, names in os.walk(folder):

@@ -1,4 +1,4 @@
-"""Represent cards (a keyword with data lines in fields) and the parameters (``&name``) used in their fields.
+"""Represent cards (keywords with data lines that are split into fields) and the parameters (``&name``) in their fields.
 
 Numbers are evaluated on request. Each field knows its place in the file, and each parameter knows its definitions and
 where it is visible.
@@ -35,23 +35,23 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import Block
 
 
-STANDARD, LONG = 10, 20  # Width of a field in standard and long format [characters].
+STANDARD, LONG = 10, 20  # Widths of a field in standard and long format [characters].
 # Pattern of the text between commas. A comma inside an expression, as in <max(1,2)>, does not separate fields.
 _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # This pattern is compiled at its first use, to keep start-up fast.
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # This pattern is compiled on first use to keep start-up fast.
 _PARAMETERS: Final = [*PARAMETERS]
 _FLAG: Final = PARAMETER_FLAG["DFLAG"]
 
 
 class CardField(NamedTuple):
-    """The text of one field without surrounding blanks, and its position; the column is counted from 1."""
+    """The text of one field without surrounding spaces, and its position; the column is counted from 1."""
 
     text: str
     block: Block
-    distance: int  # Number of lines from the keyword to the field.
+    distance: int  # Number of lines between the keyword line and the field.
     column: int
 
     @property
@@ -61,12 +61,12 @@ class CardField(NamedTuple):
 
     @property
     def line(self) -> int:
-        """Return the line number in the file, which is computed on request."""
+        """Return the line number in the file, which is computed on first use."""
         return self.block.line + self.distance
 
     @property
     def at(self) -> str:
-        """Return the file and line in the form used in messages."""
+        """Return the file and line as they appear in messages."""
         return f"{self.file}:{self.line}"
 
 
@@ -76,7 +76,7 @@ Problem = tuple[CardField, str]
 
 @dataclass(eq=False, repr=False, slots=True)
 class Value(Generic[T]):
-    """The value of a field; if ``value`` is only the default, ``problem`` contains the reason.
+    """The value of a field; if ``value`` is a default for an unreadable field, ``problem`` gives the reason.
 
     ``place`` is the field, or the row in which it has this ``position``: most fields are never needed for a message.
     """
@@ -89,7 +89,7 @@ class Value(Generic[T]):
 
     @property
     def field(self) -> CardField:
-        """Return the field from which the value was read."""
+        """Return the field that contains the value."""
         if isinstance(self.place, Row):
             return self.place.field(self.position)
         return self.place
@@ -107,7 +107,7 @@ class Row:
 
     @property
     def blank(self) -> bool:
-        """Return True if the line is blank."""
+        """Return True if the line is blank or empty."""
         return not self.text.strip()
 
     def field(self, position: int) -> CardField:
@@ -125,7 +125,7 @@ class Row:
         return CardField(text.strip(), self.block, self.distance, column)
 
     def cell(self, position: int) -> str:
-        """Return the text of a field. The texts of all fields are cached, because callers read them in order."""
+        """Return the text of a field. The texts of all fields are cached, because callers read the fields in order."""
         cells = self._cells
         if cells is None:
             cells = self._cells = [*map(str.strip, self._pieces())]
@@ -141,7 +141,7 @@ class Row:
 
 
 class Transform(NamedTuple):
-    """Effects of ``*INCLUDE_TRANSFORM`` on an included file: the offsets of its ids and the factor of its times.
+    """Effects of ``*INCLUDE_TRANSFORM`` on an included file: its id offsets and its time factor.
 
     ``scaled``: the file has another unit of mass, time or length. ``moved``: its nodes are moved.
     """
@@ -170,7 +170,7 @@ class Transform(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Card:
-    """A keyword block that d2rpick uses; ``name`` is the keyword in upper case without ``*`` and format suffix."""
+    """A keyword block that d2rpick uses; ``name`` is the keyword in upper case, without ``*`` and format suffix."""
 
     name: str
     block: Block
@@ -190,12 +190,12 @@ class Card:
 
     @property
     def at(self) -> str:
-        """Return the file and line of the keyword in the form used in messages."""
+        """Return the file and line of the keyword as they appear in messages."""
         return f"{self.file}:{self.line}"
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Return all data lines, including blank lines but no comments."""
+        """Return all data lines, including blank lines but excluding comments."""
         return tuple(
             [
                 Row(self.block, distance, text, self.width)
@@ -205,12 +205,12 @@ class Card:
 
     @cached_property
     def lines(self) -> tuple[Row, ...]:
-        """Return all data lines that are not blank."""
+        """Return all data lines except blank lines."""
         return tuple(row for row in self.rows if not row.blank)
 
     @cached_property
     def data(self) -> tuple[Row, ...]:
-        """Return the data lines that are not blank, without the title line of a keyword with ``_TITLE``."""
+        """Return all data lines except blank lines and the title line of a keyword with ``_TITLE``."""
         if "TITLE" in self.name:
             return tuple(row for row in self.rows[1:] if not row.blank)
         return self.lines
@@ -226,7 +226,7 @@ class Card:
 
     @property
     def here(self) -> CardField:
-        """Return the keyword as a field, for use in messages."""
+        """Return the keyword as a field, for messages."""
         return CardField(f"*{self.name}", self.block, 0, 1)
 
     def real(self, row: Row, column: CardColumn, default: float = 0.0) -> Value[float]:
@@ -234,11 +234,11 @@ class Card:
         return self._number(row, column.position, default, float)
 
     def integer(self, row: Row, column: CardColumn, default: int = 0) -> Value[int]:
-        """Read an integer; a real number is accepted if its fraction is zero."""
+        """Read an integer; a real number is accepted if it has no fractional part."""
         return self._number(row, column.position, default, int)
 
     def numbers(self, row: Row, line: DataLine) -> list[Any]:
-        """Read all columns of a line in which every column is a number."""
+        """Read all columns of a line that contains only numbers."""
         return [
             self.real(row, column)
             if column.kind is float
@@ -264,7 +264,7 @@ class Card:
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, column: CardColumn) -> float | None:
-        """Read a positive number; None if the number is not positive, or if its include file has other units."""
+        """Read a positive number; None if the number is not positive, or if its include file has different units."""
         number = self.real(row, column)
         if self.transform.scaled or number.problem or number.value <= 0:
             return None
@@ -282,7 +282,7 @@ class Card:
         )
 
 
-# The classes below represent the parameters of a deck.
+# The classes below represent the parameters in a deck.
 
 
 class Definition(NamedTuple):
@@ -304,7 +304,7 @@ _Table = dict[str, list[Definition]]
 
 
 class Scope:
-    """The parameters visible in one file: local parameters hide global parameters and those of including files.
+    """The parameters visible in one file; local parameters hide global parameters and parameters of including files.
 
     If a parameter is defined several times, the first definition is used (Vol I R17 as quoted by a converter: DFLAG 1
     warns and keeps the first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` lets a later one replace it.
@@ -318,12 +318,12 @@ class Scope:
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        # Number of definitions read before a card; later definitions do not apply to the card.
+        # Number of definitions before a card; later definitions do not apply to this card.
         self._known: float = math.inf
         self._seen = self
 
     def as_of_now(self) -> Scope:
-        """Return the scope at the current position; later definitions do not change its values."""
+        """Return the scope at the current position; later definitions do not change the values in this scope."""
         if self._seen._known != self._whole._count:
             self._seen = Scope(self._outer)
             self._seen._local, self._seen._whole, self._seen._known = (
@@ -351,7 +351,7 @@ class Scope:
         )
 
     def definition(self, name: str) -> Definition | None:
-        """Return the definition that applies; None if the parameter is not defined yet."""
+        """Return the definition that applies; None if the parameter has not been defined yet."""
         earlier = [
             definition
             for definition in self.definitions(name)
@@ -383,7 +383,7 @@ class Scope:
         return parse_number(text)
 
     def text(self, text: str) -> str:
-        """Return the text of a field in which each reference ``&name`` to a character parameter is replaced."""
+        """Return the text of a field with each reference ``&name`` to a character parameter replaced by its value."""
 
         def value(reference: re.Match[str]) -> str:
             definition = self.definition(reference[1].lower())
@@ -408,7 +408,7 @@ class Scope:
                 self._whole._count += 1
 
     def _tables(self) -> Iterator[_Table]:
-        """Yield the tables of definitions, from the innermost scope to the global scope."""
+        """Yield the tables of definitions, from the innermost scope out to the global scope."""
         yield self._local
         yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
@@ -465,7 +465,7 @@ class Scope:
 def _read_definitions(
     rows: Sequence[Row], options: set[str]
 ) -> Iterator[tuple[Row, str, str]]:
-    """Yield row, name with type letter, and value text of each definition on a parameter card."""
+    """Yield the row, the name with its type letter, and the value text of each definition on a parameter card."""
     if "EXPRESSION" in options:
         yield from _read_expressions(rows)
         return
@@ -479,7 +479,7 @@ def _read_definitions(
 
 
 def _read_expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
-    """Yield one definition per line; a line with a blank name field continues the previous expression."""
+    """Yield one definition per line; a line whose name field is blank continues the previous expression."""
     pending: tuple[Row, str, str] | None = None
     for row in rows:
         name_part, comma, value_part = row.text.partition(",")

@@ -1,4 +1,4 @@
-"""Describe data lines by columns, each declared once with name, type and width, for reading and writing them.
+"""Declare the columns of data lines once, with name, type and width, for both reading and writing.
 
 The lines of LS-DYNA keywords are declared in `ls_dyna_columns`, those of Radioss blocks in `radioss_columns`.
 """
@@ -19,7 +19,7 @@ WIDTH: Final = 10  # Width of a field [characters].
 
 
 class CardColumn(NamedTuple):
-    """A column of a data line: its name in the solver's manual, the type of its values, and its width [characters].
+    """A column of a data line: its name in the solver manual, the type of its values, and its width [characters].
 
     ``start`` is its first character, from 0.  ``position`` counts the fields of 10 characters before it: in free format
     and in long format the line has the same fields in the same order.
@@ -36,7 +36,7 @@ class CardColumn(NamedTuple):
         return self.start // WIDTH
 
     def cut(self, line: str) -> str:
-        """Return the text of this column in a line, including blanks."""
+        """Return the text of this column in a line, including spaces."""
         return line[self.start : self.start + self.width]
 
     def format(self, value: Cell) -> str:
@@ -44,7 +44,7 @@ class CardColumn(NamedTuple):
         return f"{value!s:>{self.width}}"
 
     def put(self, line: str, value: Cell) -> str:
-        """Return a line in which the value of this column is replaced."""
+        """Return the line with the value in this column replaced."""
         before = line[: self.start].ljust(self.start)
         return f"{before}{self.format(value)}{line[self.start + self.width :]}"
 
@@ -65,7 +65,7 @@ def words(names: str, width: int = WIDTH) -> list[CardColumn]:
 
 
 def blank(width: int) -> list[CardColumn]:
-    """Declare a column that has no name and stays blank."""
+    """Declare a column that has no name and is left blank."""
     return [CardColumn("", str, width, 0)]
 
 
@@ -74,7 +74,7 @@ def _declare(names: str, kind: Kind, width: int) -> list[CardColumn]:
 
 
 class DataLine:
-    """The columns of a data line from left to right.
+    """The columns of a data line, from left to right.
 
     Examples
     --------
@@ -98,16 +98,16 @@ class DataLine:
         return self._columns[name]
 
     def __iter__(self) -> Iterator[CardColumn]:
-        """Iterate over the columns from left to right."""
+        """Iterate over the columns, from left to right."""
         return iter(self._columns.values())
 
     @property
     def layout(self) -> list[tuple[int, int]]:
-        """Return the first character and the width of each column."""
+        """Return the index of the first character and the width of each column."""
         return [(column.start, column.width) for column in self]
 
     def write(self, **values: Cell) -> str:
-        """Return a line with these values. A missing value becomes 0, a blank or ``0.0``, as its column requires."""
+        """Return a line with these values. A missing value becomes 0, spaces or ``0.0``, as its column requires."""
         assert values.keys() <= self._columns.keys()
         defaults: dict[Kind, Cell] = {int: 0, float: 0.0, str: ""}
         return "".join(
@@ -116,7 +116,7 @@ class DataLine:
         )
 
     def write_names(self) -> str:
-        """Return the comment line of LS-DYNA with the names of the columns, in lower case.
+        """Return the LS-DYNA comment line that contains the column names in lower case.
 
         Examples
         --------
@@ -128,12 +128,12 @@ class DataLine:
 
 
 def cut_fields(line: str) -> list[str]:
-    """Return the texts of all 10-character fields in a line that lists ids."""
+    """Return the texts of all 10-character fields in a line of ids."""
     return [line[at : at + WIDTH].strip() for at in range(0, len(line), WIDTH)]
 
 
 def write_list(line: DataLine, values: Iterable[Cell]) -> Iterator[str]:
-    """Yield lines that list values; each line except the last has all of its columns filled."""
+    """Yield lines of values; in each line except the last, all columns are filled."""
     columns = list(line)
     cells = list(values)
     for first in range(0, len(cells), len(columns)):

@@ -1,4 +1,4 @@
-"""Find the times of force-controlled switches that make parts rigid in planned windows.
+"""Find settings with which force-controlled switches make parts rigid in the planned windows.
 
 These are TIME1, TIME2, TIME3 and OFFSET of an LS-DYNA pair, or Tdelay of a Radioss sensor. A force switch has no times
 of its own. One wait for all windows is chosen so that, with the known contact times of a run, the resulting windows are
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Spans = tuple[Times, ...]
 
 
-_ROUNDING: Final = 1e-12  # Relative rounding error of a sum of times [-].
+_ROUNDING: Final = 1e-12  # Relative rounding error in a sum of times [-].
 
 
 class Pushes(NamedTuple):
@@ -51,7 +51,7 @@ class ForceTiming(NamedTuple):
 
 
 def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
-    """Return the times of a pair of LS-DYNA switch sets that makes parts rigid in planned windows.
+    """Return the times of a pair of LS-DYNA switch sets that makes parts rigid in the planned windows.
 
     The switch makes parts rigid when no force has acted for the wait (the force-free time that shows a flight), and
     deformable shortly before the next force. OFFSET is the distance that the parts fly from td of the first window to
@@ -90,7 +90,7 @@ def find_pair_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
 
 
 def find_sensor_timing(windows: Sequence[Times], pushes: Pushes) -> ForceTiming:
-    """Return the times of a Radioss force sensor. Parts are deformable during each force and a waiting time after it.
+    """Return the times of a Radioss force sensor, with parts deformable during each force and a waiting time after it.
 
     Before the first window and after the last one they are deformable in any case.
 
@@ -125,7 +125,7 @@ def _find_least_wait(
     follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
-    """Return the shortest waiting time that gives the planned number of windows, none of which begins too early."""
+    """Return the shortest waiting time that gives the planned number of windows, none of them earlier than planned."""
     switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
@@ -146,12 +146,12 @@ def _find_least_wait(
 
 
 def _find_after(time: float, spans: Sequence[Times]) -> Times:
-    """Return the first span that begins at or after a time; if there is none, return infinity twice."""
+    """Return the first span that begins at or after a time, or (infinity, infinity) if there is none."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
-    """Return the last span that ends at or before a time; if there is none, return minus infinity twice."""
+    """Return the last span that ends at or before a time, or (-infinity, -infinity) if there is none."""
     return next(
         (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
     )

@@ -1,4 +1,4 @@
-"""Write Radioss engine files: the end of the engine run, the bodies to switch, and the time-step limit."""
+"""Write Radioss engine files, with the end of the engine run, the bodies to switch, and the time-step limit."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from d2rpick.deck.printed_card import Times
 
 # Smallest number of time steps in a rigid window; it must be high, because parts are released up to one step late.
-# Each window has its own time-step limit, so that later windows do not change the run before them.
+# Each window has its own time-step limit, so that adding a window does not change the run before it.
 _CAP_SHARE = 1000
 _NODES_PER_LINE = 10
-# Largest number of engine runs; this number has two digits in the names of time history files.
+# Largest number of engine runs, because the names of time history files contain the number with two digits.
 MOST_LEGS = 99
 
 
 class EngineFile(NamedTuple):
-    """An engine run: its number, its end [time], and its time-step limit [time] (None if no bodies are rigid)."""
+    """An engine run: its number, its end [time], and its time-step limit [time] (None if no body is rigid)."""
 
     number: int
     stop: float
@@ -29,14 +29,14 @@ class EngineFile(NamedTuple):
 
 
 def choose_step_cap(tr: float, td: float) -> float:
-    """Return the time-step limit while the parts are rigid from tr to td [time]."""
+    """Return the time-step limit while parts are rigid from tr to td [time]."""
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
 def plan_legs(
     windows: Sequence[Times], end: float, step_cap: float | None
 ) -> list[EngineFile]:
-    """Return the engine runs for rigid windows up to ``end``; a window that begins at 0 needs no run before it.
+    """Return the engine runs for rigid windows up to ``end``; a window that begins at 0 needs no engine run before it.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def plan_legs(
 
 
 def write_bodies_off(nodes: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the block that deactivates rigid bodies.
+    """Yield the lines of a block that deactivates rigid bodies.
 
     The OpenRadioss starter ignores a second such block that follows the first one directly.
     """

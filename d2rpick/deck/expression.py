@@ -1,4 +1,4 @@
-"""Evaluate numbers and expressions in decks with a small parser; no text of a deck is executed as Python.
+"""Evaluate numbers and expressions in decks with a small parser; no deck text is ever executed as Python code.
 
 Source: LS-DYNA Vol I R17, pages 36-7 to 36-9, as quoted by a converter (secondary): integers stay integers (``2/5`` is
 0), the unary minus binds more tightly than ``**`` (``-3**2`` is 9), and the functions are those of Fortran.
@@ -20,13 +20,13 @@ Number = int | float
 _NUMBER = re.compile(
     r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII
 )
-_TOKEN: Final = (  # This pattern is compiled at its first use, to keep start-up fast.
+_TOKEN: Final = (  # This pattern is compiled on first use to keep start-up fast.
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # Reference to a parameter, such as &tend.
-# Largest depth of nested parentheses; the limit prevents the recursion from exhausting Python's stack.
+# Largest depth of nested parentheses, which keeps the recursion from exhausting Python's stack.
 _DEEPEST = 50
-LONGEST = 40  # Largest number of characters in a number of a deck.
+LONGEST = 40  # Largest number of characters in a number.
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -34,12 +34,12 @@ _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi
 
 
 class ExpressionError(Exception):
-    """Raised inside the deck reader for a string that is not a number; the message gives the reason."""
+    """Raised inside the deck reader for a string that is not a number; the message states why."""
 
 
 @lru_cache(4096)  # Results are cached, because most fields are blank or 0.
 def parse_number(text: str) -> Number:
-    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` (no exponent letter).
+    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, or ``1.5-3`` (without an exponent letter).
 
     Examples
     --------
@@ -68,7 +68,7 @@ def is_deck_number(text: str) -> bool:
 
 @lru_cache(4096)
 def convert_plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Return the number in a string that is a plain number of this type; None if the string must be evaluated."""
+    """Return the number in a string that is a plain number of this type; None if the string has to be evaluated."""
     return (
         None
         if "&" in text or text[0] == "<"
@@ -99,7 +99,7 @@ def convert_text(
 
 
 def parse_real(text: str) -> float:
-    """Parse a field as a number: a blank gives 0.0, and any other string that is not a number gives NaN."""
+    """Parse a field as a number: a blank field gives 0.0, and text that is not a number gives NaN."""
     try:
         return float(parse_number(text)) if text.strip() else 0.0
     except ExpressionError:
@@ -107,7 +107,7 @@ def parse_real(text: str) -> float:
 
 
 def find_parameters(text: str) -> tuple[str, ...]:
-    """Return the names of the parameters that a string uses, in lower case.
+    """Return the names of the parameters used in a string, in lower case.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def find_parameters(text: str) -> tuple[str, ...]:
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
-    """Evaluate an expression; ``lookup`` returns the value of a parameter for its lower-case name.
+    """Evaluate an expression; ``lookup`` returns the value of a parameter from its lower-case name.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
 
 
 def _round_half_away(x: Number) -> int:
-    """Round to the nearest integer, with halves rounded away from zero."""
+    """Round to the nearest integer, and halves away from zero."""
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
@@ -183,7 +183,7 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
 
 
 def _divide(x: Number, y: Number) -> Number:
-    """Divide as Fortran does: two integers give an integer, rounded towards zero."""
+    """Divide as Fortran does: the quotient of two integers is an integer, rounded towards zero."""
     if isinstance(x, int) and isinstance(y, int):
         whole = abs(x) // abs(y)
         return whole if (x < 0) == (y < 0) else -whole
@@ -191,12 +191,12 @@ def _divide(x: Number, y: Number) -> Number:
 
 
 def _raise_to_power(x: Number, y: Number) -> Number:
-    """Raise a number to a power as Fortran does: two integers give an integer."""
+    """Raise a number to a power as Fortran does: an integer to the power of an integer gives an integer."""
     result = math.pow(x, y)
     return int(result) if isinstance(x, int) and isinstance(y, int) else result
 
 
-# Precedence of each operator, and the function that applies the operator.
+# Precedence of each operator, and the function that implements it.
 _OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
     "+": (1, operator.add),
     "-": (1, operator.sub),
@@ -216,14 +216,14 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
-        """Evaluate the whole expression, which must end at the end of the text."""
+        """Evaluate the whole expression, which must end where the text ends."""
         value = self.nested()
         if self.tokens[0]:
             raise self.unexpected()
         return value
 
     def nested(self, lowest_level: int = 1) -> Number:
-        """Evaluate one level of nesting: operators with a precedence of at least ``lowest_level``."""
+        """Evaluate one level of nesting, with the operators whose precedence is at least ``lowest_level``."""
         self.depth += 1
         if self.depth > _DEEPEST:
             raise ExpressionError(
@@ -234,13 +234,13 @@ class _Parser:
         return value
 
     def value(self, lowest_level: int) -> Number:
-        """Evaluate a signed value and the operators after it with a precedence of at least ``lowest_level``."""
+        """Evaluate a signed value and the operators after it whose precedence is at least ``lowest_level``."""
         value = self.signed()
         while (operation := _OPERATIONS.get(self.tokens[0])) and operation[
             0
         ] >= lowest_level:
             level, operate = operation
-            # Operators of equal precedence apply from the left, powers from the right.
+            # Operators of equal precedence are applied from left to right, powers from right to left.
             if self.tokens.pop(0) == "**":
                 operand = self.nested(level)
             else:
@@ -249,7 +249,7 @@ class _Parser:
         return value
 
     def signed(self) -> Number:
-        """Evaluate a value preceded by any number of signs."""
+        """Evaluate a value with any number of signs before it."""
         negative = False
         while self.tokens[0] in ("+", "-"):
             negative ^= self.tokens.pop(0) == "-"
@@ -322,7 +322,7 @@ def _split_tokens(text: str) -> Iterator[str]:
 
 
 def _check_range(value: Number) -> Number:
-    """Return the value; raise ExpressionError if it is not finite or is too large."""
+    """Return the value; raise ExpressionError if it is infinite, undefined or too large."""
     if isinstance(value, int) and abs(value) >= _INTEGER_LIMIT:
         raise ExpressionError("an integer leaves the 64-bit range")
     if not math.isfinite(value):

@@ -1,4 +1,4 @@
-"""Evaluate force-controlled switches (CODE 1 to 4 of LS-DYNA) for known contact times.
+"""Evaluate force-controlled switches (LS-DYNA's CODE 1 to 4) for known contact times.
 
 Source: the vendor's keyword data as published in its Python library. A set switches between TIME1 and TIME2 when the
 force of its contact or wall is zero (CODE 1, 2) or not zero (CODE 3, 4). The sets of a pair act in turn, beginning with
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ForceSwitch(NamedTuple):
-    """A switch set that waits for a force (``with_force`` is True), or for the absence of a force.
+    """A switch set that waits until a force acts (``with_force`` is True) or until no force acts.
 
     The set acts between ``earliest`` and ``latest`` [time]. ``delay`` is TIME3. ``paired``: the set and its pair act in
     turn.
@@ -81,7 +81,7 @@ def _follow_switches(
     second: tuple[ForceSwitch | None, Spans],
     end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which two paired sets switch alternately, each with True if the parts become rigid."""
+    """Yield the times at which two sets switch in turn, each with True if the parts become rigid, else False."""
     ready = 0.0
     turns = cycle((first, second)) if first[0].paired else iter((first, second))
     for acting, contacts in turns:
@@ -97,7 +97,7 @@ def _follow_switches(
 
 
 def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
-    """Return the first time at or after ``since`` at which a force acts, or does not act; infinity if there is none."""
+    """Return the first time at or after ``since`` at which a force acts, or none acts; infinity if there is none."""
     for start, end in contacts:
         if since < end:
             if with_force:
@@ -111,7 +111,7 @@ def _find_next_switch(with_force: bool, since: float, contacts: Spans) -> float:
 def find_delay_without_chatter(
     windows: Sequence[tuple[float, float]], contacts: Spans
 ) -> float | None:
-    """Return the smallest TIME3 of the releasing set with which the pair switches in these windows only.
+    """Return the smallest TIME3 of the releasing set at which the pair switches in these windows only.
 
     Each contact before a window must be over within this time; None if no contact precedes any window.
     """
@@ -125,7 +125,7 @@ def find_delay_without_chatter(
 def _find_cluster(
     contacts: Spans, windows: Sequence[tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return the time span from the first to the last contact since the previous window."""
+    """Return the time span from the first to the last contact after the end of the previous window."""
     last_end = contacts[-1][1]
     last_window_end = max(
         (td for _, td in windows if td <= last_end), default=-math.inf

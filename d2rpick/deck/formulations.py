@@ -1,4 +1,4 @@
-"""Map the formulation numbers of elements to names and to the class that determines their cost.
+"""Map formulation numbers of elements to formulation names and to the classes that determine the element cost.
 
 Measured classes: QBAT, QEPH and BT shells, beams, solids and springs (weights in `d2rpick.choice.parts.cost`).
 A formulation that was not measured has the class of a similar one, with ``measured`` False.
@@ -11,10 +11,10 @@ from typing import Final
 from d2rpick.deck.model import Formulation
 
 BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "spring"
-# Number of integration points in each layer of a shell, keyed by formulation class.
+# Number of integration points per layer of a shell, keyed by formulation class.
 _IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
-# Formulation of Radioss quadrilaterals, keyed by Ishell (source: Altair's public help for /PROP/TYPE1).
+# Formulation of Radioss quadrilaterals, keyed by Ishell. Source: Altair's public help for /PROP/TYPE1.
 _ISHELL: Final = {
     **{number: Formulation(f"BT (Ishell {number})", BT) for number in (1, 2, 3, 4)},
     12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
@@ -23,7 +23,7 @@ _ISH3N: Final = {
     **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
-# Name of Radioss solids, keyed by Isolid. They form one class, because the measured costs of 24, 17 and 1 are equal.
+# Names of Radioss solids, keyed by Isolid. They share one class, because the measured costs of 24, 17 and 1 are equal.
 _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
@@ -47,7 +47,7 @@ _ELFORM_SHELL: Final = {
 def find_radioss_formulation(
     kind: str, shell: int, triangle: int, solid: int
 ) -> Formulation | None:
-    """Return the Radioss formulation of a kind of element from the flags of its property; None if it is unknown."""
+    """Return the Radioss formulation of one kind of element from its property flags; None if it is unknown."""
     if kind == "shell":
         return _add_layer_points(
             _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
@@ -66,7 +66,7 @@ def find_radioss_formulation(
 
 
 def find_ls_dyna_formulation(kind: str, elform: int) -> Formulation | None:
-    """Return the LS-DYNA formulation of a kind of element from its ELFORM; None if it is unknown."""
+    """Return the LS-DYNA formulation of one kind of element from its ELFORM; None if it is unknown."""
     if kind == "shell":
         name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
         return _add_layer_points(
@@ -83,7 +83,7 @@ def _add_layer_points(shell: Formulation) -> Formulation:
 
 
 def _make_plain_formulation(kind: str, *, measured: bool) -> Formulation | None:
-    """Return the formulation of a kind of element that has only one formulation; None if it is unknown."""
+    """Return the formulation of an element kind that has only one formulation; None if it is unknown."""
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
     cost = alike.get(kind)
     if kind in ("tetrahedron", "pentahedron", "thick shell"):

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
-# Number of elements that are processed at once; their arrays fit into the processor's cache.
+# Number of elements that are processed at a time; their arrays fit into the processor cache.
 _PIECE: Final = 1 << 14
-# Nodes of each face of a brick, in order as seen from outside.
+# Nodes of each face of a brick, in order when seen from outside.
 _FACES: Final = (
     (0, 3, 2, 1),
     (4, 5, 6, 7),
@@ -112,7 +112,7 @@ def _compute_step(data: PartData, measured: Sequence[_ElementTotals]) -> float |
 
 
 def _get_depth(kind: str, data: PartData) -> float | None:
-    """Return the factor that converts an element size to a volume [length, area or 1]; None if it is unknown."""
+    """Return the factor from element size to volume [length, area or 1]; None if it is unknown."""
     if kind in _SURFACES:
         return data.section.thickness
     if kind in _LINES:
@@ -121,7 +121,7 @@ def _get_depth(kind: str, data: PartData) -> float | None:
 
 
 def _compute_wave_speed(kind: str, material: Material | None) -> float | None:
-    """Return the wave speed in elements of a kind [length/time]; None if it is unknown."""
+    """Return the wave speed in elements of the given kind [length/time]; None if it is unknown."""
     if material is None or material.density is None or material.modulus is None:
         return None
     plain = material.modulus / material.density
@@ -138,7 +138,7 @@ def _compute_wave_speed(kind: str, material: Material | None) -> float | None:
 def compute_sizes_and_lengths(
     kind: str, nodes: Places, coordinates: Reals
 ) -> tuple[Reals, Reals]:
-    """Return the size of each element, and the length that a wave crosses in a time step; NaN if unknown."""
+    """Return the size of each element, and the shortest length that a wave crosses in it; NaN if unknown."""
     pieces = [
         _compute_sizes(kind, nodes[at : at + _PIECE], coordinates)
         for at in range(0, len(nodes), _PIECE)
@@ -149,7 +149,7 @@ def compute_sizes_and_lengths(
 
 
 def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the size of each element, and the length that a wave crosses in a time step, both (n,); NaN if unknown."""
+    """Return the size of each element, and the shortest length that a wave crosses in it, both (n,); NaN if unknown."""
     if kind in _LINES:
         length = np.linalg.norm(
             coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1
@@ -166,7 +166,7 @@ def _compute_sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals,
 
 
 def _measure_surfaces(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the areas of shells, and the lengths that a wave crosses in a time step."""
+    """Return the areas of shells, and the shortest lengths that a wave crosses in them."""
     third = nodes[:, 2]
     last = nodes[:, 3] if nodes.shape[1] > 3 else third
     last = np.where(last == NO_NODE, third, last)
@@ -195,7 +195,7 @@ def _compute_cross_products(a: Reals, b: Reals) -> Reals:
 
 
 def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of tetrahedra, and the lengths that a wave crosses in a time step."""
+    """Return the volumes of tetrahedra, and the shortest lengths that a wave crosses in them."""
     corners = coordinates[nodes[:, :4]]
     volume = np.abs(_compute_tetrahedron_volumes(corners, (0, 1, 2, 3)))
     faces = np.stack(
@@ -208,7 +208,7 @@ def _measure_tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals
 
 
 def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Return the volumes of solids, and the wave-path lengths; nodes of a brick may repeat or be missing."""
+    """Return the volumes of solids, and the shortest wave paths; the nodes of a brick may repeat or be missing."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
         eight[:, column] = np.where(
@@ -223,7 +223,7 @@ def _measure_bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
 
 
 def _compute_volume_below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
-    """Return the signed volumes between the first corner and a face; the sum over all faces is the volume."""
+    """Return the signed volumes between the first corner and a face; their sum over all faces is the volume."""
     a, b, c, d = face
     return _compute_tetrahedron_volumes(
         corners, (0, a, b, c)
@@ -233,7 +233,7 @@ def _compute_volume_below(corners: Reals, face: tuple[int, int, int, int]) -> Re
 def _compute_tetrahedron_volumes(
     corners: Reals, four: tuple[int, int, int, int]
 ) -> Reals:
-    """Return the signed volumes of tetrahedra with these four corners."""
+    """Return the signed volumes of the tetrahedra with these corners."""
     a, b, c, d = (corners[:, at] for at in four)
     return np.asarray(
         np.einsum("ij,ij->i", _compute_cross_products(b - a, c - a), d - a) / 6
@@ -241,7 +241,7 @@ def _compute_tetrahedron_volumes(
 
 
 class PartPosition(NamedTuple):
-    """Position, inertia and watched nodes of a part, according to the deck.
+    """Position, inertia and watched nodes of a part according to the deck.
 
     ``centre`` (3,) is that of its mass [length], ``spread`` (3, 3) are its second moments divided by its mass
     [length^2]. ``watched`` maps the places of its nodes with written motion (in the node table) to their coordinates.
@@ -261,14 +261,14 @@ class _PartShare(NamedTuple):
 
 
 class Placement:
-    """Positions of the parts of a deck, which are computed on request."""
+    """Positions of the parts of a deck, computed on request."""
 
     def __init__(self, inventory: Inventory) -> None:
         self._inventory = inventory
 
     @cached_property
     def parts(self) -> Mapping[int, PartPosition]:
-        """Return the position of each part with known coordinates.
+        """Return the position of each part whose coordinates are known.
 
         Empty if elements may be missing or the deck moves nodes.
         """
@@ -289,7 +289,7 @@ class Placement:
         }
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
-        """Return the mean position (3,) of the watched nodes of given parts [length]; each node is used once.
+        """Return the mean position (3,) of the watched nodes of the given parts [length]; each node counts once.
 
         The result is None if no node is watched.
         """
@@ -301,7 +301,7 @@ class Placement:
         return np.mean(list(coordinates.values()), axis=0) if coordinates else None
 
     def find_watched_nodes(self, parts: Iterable[int]) -> dict[int, Reals]:
-        """Return the positions (3,) of the watched nodes of given parts, keyed by node number [length].
+        """Return the positions (3,) of the watched nodes of the given parts [length], keyed by node number.
 
         Nodes whose motion is written in local axes are left out.
         """
@@ -317,7 +317,7 @@ class Placement:
         }
 
     def find_nodes(self, parts: Collection[int]) -> Reals:
-        """Return the positions of all nodes of the elements of some parts, shape (n, 3) [length]."""
+        """Return the positions of all element nodes of the given parts, shape (n, 3) [length]."""
         numbers = [
             elements.nodes[np.isin(elements.part, list(parts))].ravel()
             for elements in self._inventory.elements
@@ -334,7 +334,7 @@ class Placement:
 def _compute_shares(
     elements: Elements, coordinates: Reals
 ) -> Iterable[tuple[int, _PartShare]]:
-    """Return the contributions of the elements of one kind to the position of each part."""
+    """Return what the elements of one kind contribute to the position of each part."""
     if elements.nodes.shape[1] == 0:
         return []
     if elements.kind in DISCRETE:
@@ -344,12 +344,12 @@ def _compute_shares(
     middles = _compute_centres(elements.nodes, coordinates)
     parts, part_index = np.unique(elements.part, return_inverse=True)
     total = np.bincount(part_index, sizes)
-    # Elements of unknown size do not contribute to the position of their part.
+    # Elements whose size is unknown do not contribute to the position of their part.
     total[total == 0] = np.nan
     first = np.stack(
         [np.bincount(part_index, sizes * axis) for axis in middles.T], axis=1
     )
-    # Coordinates are taken relative to the centre of the part, because digits are lost far from the origin.
+    # Coordinates are taken relative to the part centre, because far from the origin rounding would lose digits.
     x, y, z = (middles - (first / total[:, np.newaxis])[part_index]).T
     xx, yy, zz, xy, yz, zx = (
         np.bincount(part_index, sizes * a * b)
@@ -385,7 +385,7 @@ def _compute_centres(nodes: Places, coordinates: Reals) -> Reals:
 def _combine_shares(
     inventory: Inventory, part: int, shares: Sequence[_PartShare]
 ) -> PartPosition:
-    """Combine the contributions of all kinds of elements to the position of a part."""
+    """Combine the contributions of all element kinds to the position of a part."""
     size = sum(share.size for share in shares)
     centre = np.asarray(sum(share.first for share in shares) / size)
     offsets = [(share, share.first / share.size - centre) for share in shares]
@@ -396,7 +396,7 @@ def _combine_shares(
         )
         / size
     )
-    # The nodes are in ascending order, so that watched nodes can be found by bisection.
+    # The nodes are in ascending order, so that a bisection can find the watched nodes.
     nodes = inventory.nodes_by_part[part]
     positions = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     watched_nodes = inventory.watched[nodes[positions] == inventory.watched]

@@ -10,7 +10,7 @@ from typing import Final
 
 from d2rpick.deck.columns import DataLine, integers, reals, words
 
-# Lines of *DEFORMABLE_TO_RIGID_AUTOMATIC: two header lines, and a line for each part or part set.
+# Lines of *DEFORMABLE_TO_RIGID_AUTOMATIC: two header lines, then one line per part or part set.
 SWITCH_TIMES: Final = DataLine(
     integers("SWSET CODE"), reals("TIME1 TIME2 TIME3"), integers("ENTNO RELSW PAIRED")
 )
@@ -26,11 +26,11 @@ INERTIA_CENTRE: Final = DataLine(reals("XC YC ZC TM"))
 INERTIA_TENSOR: Final = DataLine(reals("IXX IXY IXZ IYY IYZ IZZ"))
 RESTART_CONTROL: Final = DataLine(reals("NRBF NCSF RWF DTMAX"))
 
-# Lines of *PART: the line below the title, and the first line of its option INERTIA.
+# Lines of *PART: the line below the title, and the first line that the option INERTIA adds.
 PART: Final = DataLine(integers("PID SECID"), words("MID"))
 PART_INERTIA: Final = DataLine(reals("XC YC ZC TM"), integers("IRCS"))
 
-# Lines of *SECTION. The second line begins with an area, a thickness or a damping constant.
+# Lines of *SECTION; the second line begins with an area, a thickness or a damping constant.
 SECTION: Final = DataLine(integers("SECID ELFORM"), reals("SHRF"), integers("NIP"))
 SECTION_SIZES: Final = DataLine(reals("FIRST"))
 
@@ -38,14 +38,14 @@ SECTION_SIZES: Final = DataLine(reals("FIRST"))
 MATERIAL: Final = DataLine(words("MID"), reals("RO E PR"))
 RIGID_MATERIAL: Final = DataLine(reals("CMO"), integers("CON1 CON2"))
 
-# Lines of sets, and the line with the id of a keyword that has the option ID.
+# Lines of sets, and the id line of a keyword with the option ID.
 SET: Final = DataLine(integers("SID"))
 SET_MEMBERS: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8"))
 SET_COLUMN: Final = DataLine(integers("ID1"))
 SET_PART_LIST: Final = DataLine(integers("PID1 PID2 PID3 PID4 PID5 PID6 PID7 PID8"))
 ENTITY: Final = DataLine(integers("ID"))
 
-# Lines of *CONSTRAINED keywords. NID is a node, or a node set if the keyword has the option SET.
+# Lines of *CONSTRAINED keywords; NID is a node, or a node set if the keyword has the option SET.
 NODAL_BODY: Final = DataLine(integers("PID CID NSID"))
 EXTRA_NODES: Final = DataLine(integers("PID NID"))
 JOINT: Final = DataLine(integers("N1 N2 N3 N4 N5 N6"))
@@ -53,14 +53,14 @@ NODE_PAIR: Final = DataLine(integers("N1 N2"))
 GENERALIZED_WELD: Final = DataLine(integers("NSID"))
 GLOBAL_CONSTRAINT: Final = DataLine(integers("TC RC DIR"), reals("X Y Z"))
 
-# Lines of *BOUNDARY_SPC with its option BIRTH_DEATH, and of *BOUNDARY_PRESCRIBED_MOTION.
+# Lines of *BOUNDARY_SPC with the option BIRTH_DEATH, and of *BOUNDARY_PRESCRIBED_MOTION.
 SPC: Final = DataLine(integers("NID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ"))
 SPC_TIMES: Final = DataLine(reals("BIRTH DEATH"))
 MOTION: Final = DataLine(
     integers("TYPEID DOF VAD LCID"), reals("SF"), integers("VID"), reals("DEATH BIRTH")
 )
 
-# Lines of *LOAD_BODY, *LOAD_BODY_PARTS, and *DEFINE_CURVE with its points.
+# Lines of *LOAD_BODY, *LOAD_BODY_PARTS, and *DEFINE_CURVE (including its points).
 BODY_LOAD: Final = DataLine(
     integers("LCID"),
     reals("SF"),
@@ -103,7 +103,7 @@ OTHER_OFFSET: Final = DataLine(integers("IDROFF"))
 UNIT_FACTORS: Final = DataLine(reals("FCTMAS FCTTIM FCTLEN"))
 TRANSFORMATION: Final = DataLine(integers("TRANID"))
 
-# Lines of *PARAMETER (four pairs of name and value) and of *PARAMETER_DUPLICATION.
+# Lines of *PARAMETER (four pairs of name and value), and of *PARAMETER_DUPLICATION.
 PARAMETER_FLAG: Final = DataLine(integers("DFLAG"))
 PARAMETERS: Final = DataLine(
     words("NAME1 VALUE1 NAME2 VALUE2 NAME3 VALUE3 NAME4 VALUE4")
@@ -111,14 +111,14 @@ PARAMETERS: Final = DataLine(
 
 
 def make_node_line(id_width: int, real_width: int) -> DataLine:
-    """Return a data line of *NODE, whose column widths depend on the format of the deck."""
+    """Return a data line of *NODE with the column widths of the deck format."""
     return DataLine(
         integers("NID", id_width), reals("X Y Z", real_width), integers("TC", id_width)
     )
 
 
 def make_element_line(width: int, node_count: int) -> DataLine:
-    """Return a data line of *ELEMENT with ``node_count`` nodes, whose width depends on the format of the deck."""
+    """Return a data line of *ELEMENT with ``node_count`` nodes and the width of the deck format."""
     nodes = " ".join(f"N{number}" for number in range(1, node_count + 1))
     return DataLine(integers(f"EID PID {nodes}", width))
 

@@ -44,15 +44,15 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-# Options of element keywords that can be read.
+# Options of element keywords that d2rpick can read.
 _OPTIONS: Final = OPTIONS_WITHOUT_IDS | {
     *("SCALR", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE"),
     *("SHL4", "TO", "SHL8", "TET4TOTET10"),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-# Keywords that define no elements, and change neither the mass nor the cost of a part.
+# Keywords that define no elements and do not change the mass or the cost of a part.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
-_TEN: Final = 10  # Number of nodes in the second line of a solid element.
+_TEN: Final = 10  # Number of nodes on the second line of a solid element.
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = (
     "MAT_DAMPER",
@@ -63,7 +63,7 @@ _DAMPERS: Final = (
 )
 _AIRBAG: Final = ("MAT_FABRIC", "MAT_034")
 _VOID: Final = ("MAT_NULL", "MAT_009")
-# Material keywords, by name and number, whose lines begin with density, Young's modulus and Poisson's ratio.
+# Material keywords, by name and by number, whose lines begin with density, Young's modulus and Poisson's ratio.
 _ELASTIC: Final = {
     *(
         "ELASTIC",
@@ -130,7 +130,7 @@ _ELASTIC: Final = {
 
 
 class _LsDynaElementKind(NamedTuple):
-    """A kind of element: its name, and the largest and smallest number of nodes of an element."""
+    """A kind of element: its name, and the smallest and largest number of nodes per element."""
 
     name: str
     most: int
@@ -189,7 +189,7 @@ def read_ls_dyna_inventory(deck: Deck) -> Inventory:
 
 
 def _note_switching_cards(deck: Deck) -> Iterator[str]:
-    """Yield a note on the first card with which the deck already switches parts."""
+    """Yield a note on the first card by which the deck already switches parts."""
     for card in deck.named("DEFORMABLE_TO_RIGID")[:1]:
         yield (
             f"{card.at}: the deck already switches parts with *{card.name}; remove its switching cards before you add "
@@ -224,7 +224,7 @@ def find_shared_nodes(
 
 
 def find_first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` that contains each node, keyed by node id."""
+    """Return the first of ``parts`` to which each node belongs, keyed by node id."""
     part_by_node: dict[int, int] = {}
     for part, node in _list_nodes(cards, parts):
         part_by_node.setdefault(node, part)
@@ -251,7 +251,7 @@ def find_parts_of_nodes(
 def _list_nodes(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:
-    """Yield part id and node id for each node of the elements of given parts, in the order of the deck."""
+    """Yield the part id and node id of each element node of the given parts, in deck order."""
     for card in cards:
         for _, owners, nodes in _read_elements(card, _TEN):
             rows = np.isin(owners, [*parts])
@@ -264,9 +264,9 @@ def _list_nodes(
 
 
 def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
-    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line with a title.
+    """Return the node ids on a *DATABASE_HISTORY_NODE card: eight per line, or one per line if it has a title.
 
-    If ``local`` is True, only those whose motion is written in a local coordinate system, else only the others.
+    If ``local`` is True, return only nodes whose motion is written in a local coordinate system, else only others.
     """
     ids = [np.empty(0, np.int64)]
     for card in deck.named("DATABASE_HISTORY_NODE"):
@@ -283,7 +283,7 @@ def _read_watched_nodes(deck: Deck, *, local: bool) -> Integers:
 
 
 def _has_moved_nodes(deck: Deck) -> bool:
-    """Return True if the deck moves nodes away from their coordinates."""
+    """Return True if the deck moves nodes away from their original coordinates."""
     moving = (*deck.named("NODE_TRANSFORM"), *deck.named("PART_MOVE"))
     return bool(moving) or any(card.transform.moved for card in deck.named("NODE"))
 
@@ -312,7 +312,7 @@ def _find_element_cards(deck: Deck) -> Iterator[Card]:
     """Yield the cards that define elements."""
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        # Seat-belt keywords for slip rings, retractors, sensors and so on define no elements.
+        # Seat-belt keywords for slip rings, retractors, sensors and the like define no elements.
         fitting = card.name.startswith("ELEMENT_SEATBELT_")
         if (
             card.name.startswith("ELEMENT_")
@@ -330,7 +330,7 @@ def _is_readable(card: Card) -> bool:
 
 
 def _get_id_width(card: Card) -> int:
-    """Return the number of characters of an id column."""
+    """Return the width of an id column [characters]."""
     words = card.block.head.split()
     if card.width == LONG:
         return LONG
@@ -341,7 +341,7 @@ def _get_id_width(card: Card) -> int:
 def _read_elements(
     card: Card, node_count: int | None = None
 ) -> Iterator[tuple[str, Integers, Integers]]:
-    """Yield the kind, part ids and node ids of a card's elements, block by block, with the id offsets of the include.
+    """Yield the kind, part ids and node ids of a card's elements block by block, with the id offsets of the include.
 
     ``node_count`` is the number of nodes of each element; default: those that define its size.
     """
@@ -368,7 +368,7 @@ def _read_elements(
                 if waiting_line is None
                 else np.concatenate([waiting_line, values])
             )
-        # A row with an element id, a part id and enough nodes is an element; other rows belong to options.
+        # A row with an element id, a part id and enough nodes is an element; any other row belongs to an option.
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (node_count or kind.most)], 0)
         yield (
@@ -379,7 +379,7 @@ def _read_elements(
 
 
 def _join_lines(values: Integers) -> tuple[Integers, Integers | None]:
-    """Join each line with element id and part id to the line of nodes below it.
+    """Join each line with element and part ids to the line of node ids below it.
 
     Return also a last line whose nodes are missing.
     """
@@ -420,7 +420,7 @@ def _read_nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 
 
 def _read_codes(lines: Lines, fields: Layout) -> Integers:
-    """Return the last field of each line as integers. Most of these fields are 0 and need no parsing."""
+    """Return the last field of each line as integers. Most of these fields are 0 and need not be parsed."""
     start, width = fields[-1]
     if (
         lines.in_columns
@@ -452,7 +452,7 @@ def _build_parts(deck: Deck, parts: DeckParts, mesh: Mesh) -> dict[int, PartData
 def _build_section(
     card: SectionCard | None, kinds: set[str], material: Material | None
 ) -> Section:
-    """Return the section of a part, with the formulations of its elements."""
+    """Return the section of a part with the formulations of its elements."""
     formulations_by_kind: dict[str, Formulation] = {}
     for kind in sorted(kinds):
         formulation = formulations.find_ls_dyna_formulation(

@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
 
-_PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP for a part and for a node set.
-# Beginnings of further keywords that connect parts; d2rpick does not read which parts they connect.
+_PART_ID, _NODE_SET = 3, 4  # Values of SSTYP and MSTYP for a part and a node set.
+# Beginnings of other keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = (
     *(
         "CONSTRAINED_TIED_NODES_FAILURE",
@@ -79,22 +79,22 @@ _OTHER_TIES: Final = (
         for kind in ("BEAM", "SHELL", "SOLID", "LAGRANGE")
     ),
 )
-# Global directions fixed by each code (0 to 7) of *NODE, *MAT_RIGID and *CONSTRAINED_GLOBAL.
+# Global directions that each code (0 to 7) of *NODE, *MAT_RIGID and *CONSTRAINED_GLOBAL fixes.
 CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))
 _ALONG: Final = {f"LOAD_BODY_{letter}": axis for axis, letter in enumerate("XYZ")}
 _MOTION, _SPC = "BOUNDARY_PRESCRIBED_MOTION", "BOUNDARY_SPC"
 _SYMMETRY: Final = "BOUNDARY_SPC_SYMMETRY_PLANE"
-# Values of DOF for which a prescribed motion has a second line.
+# Values of DOF with which a prescribed motion has a second line.
 _OWN_CENTRE: Final = (9, 10, 11)
-_RELATIVE: Final = 4  # Value of VAD for which a prescribed motion has a second line.
-# Largest distance of a node on the plane of a *CONSTRAINED_GLOBAL, as a fraction of the model size [-].
+_RELATIVE: Final = 4  # Value of VAD with which a prescribed motion has a second line.
+# Nodes up to this distance from a *CONSTRAINED_GLOBAL plane are on it, as a fraction of the model size [-].
 _FLAT: Final = 1e-4
 
 
 def read_ls_dyna_boundary(
     deck: Deck, parts: DeckParts, nodes: tuple[Places, Reals, Places]
 ) -> Boundary:
-    """Return supports, prescribed motions and gravity of a deck.
+    """Return the supports, prescribed motions and gravity in a deck.
 
     ``nodes`` holds ids, coordinates and codes of fixed translations.
     """
@@ -117,7 +117,7 @@ def read_ls_dyna_boundary(
 
 
 def _describe_card(card: Card) -> str:
-    """Return the keyword of a card with its file and line, for use in messages."""
+    """Return the keyword, file and line of a card for messages."""
     return f"*{card.name} ({card.at})"
 
 
@@ -130,7 +130,7 @@ def _note_unknown_nodes(card: Card) -> str:
 
 
 def _read_supports(deck: Deck) -> Iterator[Hold | str]:
-    """Yield the supports of *BOUNDARY_SPC, or notes on those that cannot be read."""
+    """Yield the supports in *BOUNDARY_SPC, or notes on those that cannot be read."""
     for card in deck.named(_SPC):
         options = card.options(_SPC)
         if card.name.startswith(_SYMMETRY):
@@ -148,7 +148,7 @@ def _read_supports(deck: Deck) -> Iterator[Hold | str]:
 
 
 def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
-    """Read a line of *BOUNDARY_SPC for a node or a node set. A constraint along local axes is always a support."""
+    """Read a line of *BOUNDARY_SPC for a node or a node set. A constraint in local axes always counts as a support."""
     nodes = _find_nodes(deck, card, row)
     _, system, *flags = card.numbers(row, SPC)
     fixed = [bool(flag.value) for flag in flags]
@@ -166,7 +166,7 @@ def _read_support(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold |
 
 
 def _set_times(hold: Hold, card: Card, row: Row, line: DataLine) -> Hold:
-    """Add the birth time and the death time of a card to its load; missing times mean 0 and infinity."""
+    """Add the birth and death times of a card to its load; missing times mean 0 and infinity."""
     start, end = (
         card.real(row, line[name]).value * card.transform.time
         for name in ("BIRTH", "DEATH")
@@ -175,7 +175,7 @@ def _set_times(hold: Hold, card: Card, row: Row, line: DataLine) -> Hold:
 
 
 def _find_nodes(deck: Deck, card: Card, row: Row) -> Places | None:
-    """Return the node, or the nodes of the node set (``_SET``), at the beginning of a line.
+    """Return the node, or the nodes of the node set (``_SET``), given at the beginning of a line.
 
     None if they are unknown.
     """
@@ -194,7 +194,7 @@ def _read_node_supports(numbers: Places, codes: Places) -> Iterator[Hold]:
 
 
 def _read_plane_support(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
-    """Return the support of the nodes on the plane fixed by a *CONSTRAINED_GLOBAL."""
+    """Return the support of the nodes on the plane that a *CONSTRAINED_GLOBAL fixes."""
     rows = card.lines
     if rows:
         code, normal = (
@@ -375,7 +375,7 @@ def _read_curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 
 def read_joints(deck: Deck) -> Joints:
-    """Return the joints between parts of an LS-DYNA deck, except joints that let two rigid bodies rotate."""
+    """Return the joints between parts of an LS-DYNA deck, except joints that let two rigid bodies rotate freely."""
     joints = []
     unknown = [
         _describe_card(card) for name in _OTHER_TIES for card in deck.named(name)

@@ -1,4 +1,4 @@
-"""Read parts, sections, sets, rigid materials and constraints of an LS-DYNA deck, to which switching cards refer.
+"""Read the data of an LS-DYNA deck to which switching cards refer: parts, sections, sets, materials and constraints.
 
 Columns: the vendor's keyword data as published in its Python library.
 """
@@ -43,13 +43,13 @@ _EXTRA_LINES: Final = {
     "FIELD": 1,
     "INERTIA": 3,
 }
-# Options of *PART that can be read; the options AVERAGED and TITLE add no line.
+# Options of *PART that d2rpick can read; the options AVERAGED and TITLE add no line.
 _FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
-_ROTATED = 1  # Value of IRCS for which *PART_INERTIA has one more line.
+_ROTATED = 1  # Value of IRCS with which *PART_INERTIA has one more line.
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
-# Cached node sets of each deck.
+# Node sets of each deck that have been read.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
 # Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
@@ -65,7 +65,7 @@ NOT_TURNED: Final = {
     16: "tetrahedron with 10 nodes",
     17: "tetrahedron with 10 nodes",
 }
-# Number of lines of one section, keyed by kind of element.
+# Number of lines per section, keyed by kind of element.
 _LINES: Final = {
     "SOLID": 1,
     "DISCRETE": 2,
@@ -74,7 +74,7 @@ _LINES: Final = {
     "TSHELL": 2,
 }
 _SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
-# Options of element keywords whose further lines have no integers in the columns of the ids.
+# Options of element keywords whose additional lines have no integers in the id columns.
 OPTIONS_WITHOUT_IDS: Final = {
     "THICKNESS",
     "BETA",
@@ -90,7 +90,7 @@ OPTIONS_WITHOUT_IDS: Final = {
 }
 
 _BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
-# Second words of *CONTACT keywords that define no contact.
+# Second words of *CONTACT keywords that do not define a contact.
 _NO_CONTACTS: Final = {
     "ADD",
     "AUTO",
@@ -99,18 +99,18 @@ _NO_CONTACTS: Final = {
     "GEBOD",
     "GUIDED",
 }
-# Words in the names of contacts whose force can trigger a switch.
+# Words in the names of those contacts whose force can trigger a switch.
 _ABLE: Final = (
     "SURFACE_TO_SURFACE",
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
-# Largest number of lines of a contact or wall without an id; further lines may define a second contact.
+# Largest number of lines of one contact or wall without an id; more lines may define a second one.
 _MOST_ROWS: Final = 8
 
 
 class DeckPartSet(NamedTuple):
-    """Members of a part set: parts, ranges of part ids, and further part sets.
+    """Members of a part set: parts, ranges of part ids, and other part sets.
 
     ``problems`` are fields that cannot be read; with one of them the members are unknown.
     """
@@ -132,7 +132,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Data of each part, and part sets, keyed by id; a kind of set that cannot be read is None.
+    """Data of each part, and part sets, keyed by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -148,7 +148,7 @@ class DeckParts:
     all_known: bool = True
 
     def is_rigid(self, part: int) -> bool:
-        """Return True if the material of the part is *MAT_RIGID."""
+        """Return True if the material of the part is a *MAT_RIGID."""
         return part in self.materials and self.materials[part] in self.rigid_materials
 
     def members(self, set_id: int) -> tuple[int, ...] | None:
@@ -210,7 +210,7 @@ def find_rigid_materials(deck: Deck) -> Iterator[Card]:
 
 
 def name_material(card: Card, row: Row, column: CardColumn) -> str:
-    """Return the id of a material with its offset as text, or the name of the material if the deck uses names."""
+    """Return the id of a material, with its offset, as text, or the name of the material if the deck uses names."""
     value = card.integer(row, column)
     if value.problem:
         return value.field.text.upper()
@@ -223,9 +223,9 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        # The option ATTACHMENT adds one line, as PRINT does.
+        # The option ATTACHMENT adds one line, like the option PRINT.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
-    # A composite is one part with a material for each ply; none of the materials makes the part rigid.
+    # A composite is one part with a material per ply; none of these materials makes the part rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add_part(card, card.rows[:2], "", parts)
@@ -236,7 +236,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     rows = card.rows
     at = 0
     extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
-    # The lines of a part are the title, the ids, and the lines of the options.
+    # A part has a title line, a line of ids, and the lines of its options.
     while at + 1 < len(rows):
         material = name_material(card, rows[at + 1], PART["MID"])
         _add_part(card, rows[at : at + 2], material, parts)
@@ -252,7 +252,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
 def _add_part(
     card: Card, lines: Sequence[Row], material: str, parts: DeckParts
 ) -> None:
-    """Add a part, given by its title line and its line of ids."""
+    """Add a part from its title line and its line of ids."""
     title, row = lines
     part = card.integer(row, PART["PID"])
     section = card.integer(row, PART["SECID"])
@@ -352,7 +352,7 @@ def _read_listed_ids(card: Card, options: Collection[str]) -> list[Value[int]]:
 
 
 class SectionCard(NamedTuple):
-    """A *SECTION card: its kind of element and its ELFORM.
+    """A *SECTION card: its element kind and its ELFORM.
 
     ``first`` is the first number of its second line, ``layers`` the number of integration points through the thickness.
     """
@@ -429,7 +429,7 @@ class Constraint(NamedTuple):
 
 
 def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
-    """Yield the constraints of the given kinds; the set of nodes is empty if the nodes are unknown."""
+    """Yield the constraints of the given kinds; a constraint has no nodes if its nodes are unknown."""
     for kind in kinds:
         keyword, read_card = _CONSTRAINTS[kind]
         for card in deck.named(keyword):
@@ -442,7 +442,7 @@ def _read_nodal_rigid_bodies(
     """Yield the nodal rigid bodies on a card."""
     options = card.options(_BODY)
     rows = card.lines
-    # Other options add lines, so the keyword defines only one body.
+    # Other options add lines, so a keyword with them defines only one body.
     if options - {"TITLE"}:
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
@@ -504,14 +504,14 @@ def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Const
 
 
 def _get_first_line(card: Card) -> tuple[Row, ...]:
-    """Return the first line of a card, or the next line if the option ``_ID`` adds a line for an id."""
+    """Return the first line of a card, or the next line if the option ``_ID`` adds an id line."""
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
 def _read_node_list(
     card: Card, row: Row, kind: Kind, line: DataLine, number: int = 0
 ) -> Constraint:
-    """Read a constraint whose line lists its nodes."""
+    """Read a constraint from a line that lists its nodes."""
     nodes = [card.integer(row, column) for column in line]
     ids = frozenset(
         node.value + card.transform.node for node in nodes if node.value > 0
@@ -519,7 +519,7 @@ def _read_node_list(
     return Constraint(kind, nodes[0].field, number, ids)
 
 
-# For each kind of constraint: its keyword, and the function that reads a card with this keyword.
+# For each kind of constraint, its keyword and the function that reads a card with this keyword.
 _CONSTRAINTS: Final[
     Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
 ] = {
@@ -542,7 +542,7 @@ class Entity(NamedTuple):
 
     @property
     def triggers(self) -> bool:
-        """Return True if the force of the contact can switch parts."""
+        """Return True if the force of the contact can trigger a switch."""
         return any(name in self.keyword for name in _ABLE)
 
 
@@ -553,7 +553,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id, or else the one with this number in the order of definition.
+        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
 
         An entry with an id is never found by its number.
         """

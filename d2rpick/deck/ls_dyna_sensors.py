@@ -1,4 +1,4 @@
-"""Find when LS-DYNA sensors switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
+"""Find when LS-DYNA sensors switch parts, for *SENSOR_CONTROL of type DEF2RIG and switch sets with CODE 5.
 
 A control is on or off. Its switches act in turn: when the condition of one is met, the control changes, and the next
 switch is evaluated. A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # A function that returns the time spans in which the force of a contact or wall exceeds a value, or None.
+    # A function that returns the time spans in which the force of a contact or wall exceeds a value; None if unknown.
     Forces = Callable[[str, int, float], Spans | None]
 
 
@@ -39,7 +39,7 @@ _ALWAYS: Final = ((0.0, math.inf),)
 
 
 class Control(NamedTuple):
-    """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order of their use.
+    """A *SENSOR_CONTROL for a switch set, with the ids of its *SENSOR_SWITCH cards in the order in which they are used.
 
     ``initial`` is its state at the start, ON or OFF. ``rounds`` is how often all switches act in turn; it may be
     infinite.
@@ -84,7 +84,7 @@ def read_controls(deck: Deck) -> Iterator[Control]:
 def follow_control(
     deck: Deck, control: Control, forces: Forces | None, end: float
 ) -> list[Change] | str:
-    """Return the states of a control from the start to the end of a run.
+    """Return the states of a control from the start of a run to its end.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def follow_control(
 
 
 def _find_first_time(spans: Spans, since: float) -> float:
-    """Return the first time at or after ``since`` at which a condition is met; infinity if there is none."""
+    """Return the first time at or after ``since`` at which a condition is met; infinity if it is never met."""
     return next((max(since, start) for start, end in spans if since < end), math.inf)
 
 
@@ -171,7 +171,7 @@ def _find_spans_of_switch(
 def _find_spans_of_sensor(
     deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
 ) -> Spans | str:
-    """Return the spans in which the force on a sensor is above (or below) a value, or why they are unknown."""
+    """Return the spans in which the force on a sensor is above or below a value, or why the spans are unknown."""
     card, row = _find_row(
         deck.named("SENSOR_DEFINE"), SENSOR_FORCE["SENSID"], number
     ) or (None, None)
@@ -186,7 +186,7 @@ def _find_spans_of_sensor(
     if card.transform.scaled:
         return f"{name}), which is in an include in other units"
     entity = card.integer(row, SENSOR_FORCE["TYPEID"]).value + card.transform.rest
-    # The magnitude of a force never falls below 0.
+    # The magnitude of a force is never negative.
     if value < 0 or (value == 0 and not above):
         return _ALWAYS if above else ()
     strong = forces(kind, entity, value) if forces else None
@@ -198,7 +198,7 @@ def _find_spans_of_sensor(
 def _find_row(
     cards: Sequence[Card], column: CardColumn, number: int
 ) -> tuple[Card, Row] | None:
-    """Return the line that contains this id in a column, with the id offset of its include file, and its card."""
+    """Return the line with this id in a column, the id offset of its include file, and its card."""
     rows: Iterable[tuple[Card, Row]] = (
         (card, row) for card in cards for row in card.data
     )

@@ -1,4 +1,4 @@
-"""Read meshes: arrays of numbers from many lines at once, and the elements and nodes that they define.
+"""Read meshes: arrays of numbers from many lines at a time, and the elements and nodes that they define.
 
 A mesh of millions of lines is read in pieces. Lines with commas and fields with parameters are rare in a mesh and are
 read one by one. Columns of Radioss: Altair's public help for the elements, and the solver's published source.
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 
-_WIDEST: Final = 240  # Number of characters of the longest line of a mesh.
+_WIDEST: Final = 240  # Longest line of a mesh [characters].
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
-# Characters that occur only in lines without fixed columns, which must be parsed separately.
+# Characters that occur only in lines without fixed columns, which are parsed separately.
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")
-# Index of the last character of most ids; a line with a character at this index is not blank.
+# Index of the last character of most ids; a line that has a character at this index is not blank.
 _ID_ENDS: Final = 7
-_HIGHEST: Final = 10**17  # Upper limit of ids; larger numbers would overflow.
-NO_NODE: Final = -1  # Index of a missing node.
-_DENSE: Final = 50_000_000  # Largest id for which a table of all ids fits into memory.
+_HIGHEST: Final = 10**17  # Ids must be smaller than this number to avoid an overflow.
+NO_NODE: Final = -1  # Index that stands for a missing node.
+_DENSE: Final = 50_000_000  # Largest id for which an id table fits into memory.
 NOTHING: Final = -1  # Placeholder for a field that contains no id.
-# Largest number of lines whose fields are all parsed together, because a deck may have a card for each element.
+# Up to this number of lines, the fields of all lines are parsed together; a deck may have a card for each element.
 _FEW: Final = 1000
 
 _COMMENTS: Final = b"$#"
@@ -104,7 +104,7 @@ class Lines:
         return numbers
 
     def _field(self, start: int, width: int) -> NDArray[np.uint8]:
-        """Return the characters of a field in all lines, shape (lines, width), padded with blanks."""
+        """Return the characters of a field in all lines, shape (lines, width), padded with spaces."""
         cells = self.cells[:, start : start + width]
         missing = width - cells.shape[1]
         if missing:
@@ -125,7 +125,7 @@ class Lines:
         }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
-        """Return the texts of some fields of a line."""
+        """Return the text in each of the given fields of a line."""
         if "," in text:
             cells = text.split(",")
             return [
@@ -152,14 +152,14 @@ def read_lines(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
 
 
 def _read_pieces(block: Block) -> Iterator[bytes]:
-    """Yield the bytes below the keyword line in blocks that end with a line end."""
+    """Yield the bytes below the keyword line in blocks that end at a line ending."""
     pieces = block.source.pieces(block.start, block.end)
     yield next(pieces).partition(b"\n")[2]
     yield from pieces
 
 
 def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return lines as rows of equal length, with blanks in place of line ends."""
+    """Return lines as rows of equal length, with spaces in place of line endings."""
     ends = np.flatnonzero(raw == ord("\n"))
     if not raw.size or raw[-1] != ord("\n"):
         ends = np.append(ends, raw.size)
@@ -174,7 +174,7 @@ def _make_table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _parse_integers(field: NDArray[np.uint8]) -> Integers:
-    """Parse a field of digits: 0 for a blank, `NOTHING` for other text."""
+    """Parse a field of digits: 0 for a blank field, `NOTHING` for other text."""
     value = np.zeros(len(field), np.int64)
     is_valid = np.ones(len(field), bool)
     groups = np.zeros(len(field), np.uint8)
@@ -190,7 +190,7 @@ def _parse_integers(field: NDArray[np.uint8]) -> Integers:
 
 
 def _parse_reals(field: NDArray[np.uint8]) -> Reals:
-    """Parse a field of real numbers: 0 for a blank, NaN for other text."""
+    """Parse a field of real numbers: 0 for a blank field, NaN for other text."""
     blank = (field == _BLANK).all(axis=1)
     texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
     texts = np.where(blank, b"0", texts)
@@ -201,7 +201,7 @@ def _parse_reals(field: NDArray[np.uint8]) -> Reals:
 
 
 def _make_id(value: float) -> int:
-    """Return a value as an id; `NOTHING` if it is no valid id."""
+    """Return a value as an id, or `NOTHING` if it is not a valid id."""
     return int(value) if value >= 0 and value == int(value) else NOTHING
 
 
@@ -215,7 +215,7 @@ def find_distinct(values: Places) -> Places:
 
 
 def _find_used_ids(wanted: Sequence[Places]) -> Places:
-    """Return the ids of the nodes of elements, in ascending order."""
+    """Return the node ids of elements in ascending order."""
     highest = max((int(node_ids.max(initial=0)) for node_ids in wanted), default=0)
     if highest > _DENSE:
         used = find_distinct(
@@ -230,7 +230,7 @@ def _find_used_ids(wanted: Sequence[Places]) -> Places:
 
 
 class NodeTable:
-    """The nodes of a mesh by index: first the nodes with coordinates, then nodes that occur only in elements.
+    """The nodes of a mesh by index: first the nodes with coordinates, then the nodes that occur only in elements.
 
     ``ids`` are the node ids by place, shape (nodes,).
 
@@ -259,13 +259,13 @@ class NodeTable:
         return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
 
     def known(self, ids: Places) -> Places:
-        """Return the indices of those nodes that are in the table."""
+        """Return the indices of the nodes that are in the table."""
         places_or_none = self.places(ids)
         return np.asarray(places_or_none[places_or_none != NO_NODE])
 
     @cached_property
     def _lookup(self) -> Places:
-        """Return a table of the indices by id if all ids are small, because a table is faster than a search."""
+        """Return an array of indices by id if all ids are small, because it is faster than a search."""
         lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
         lookup[self._sorted[::-1]] = self._order[::-1]
         return lookup
@@ -297,7 +297,7 @@ class Mesh(NamedTuple):
         ids: Places,
         coordinates: Reals,
     ) -> Mesh:
-        """Join blocks of elements (kind, part ids, node ids) with all nodes that have coordinates."""
+        """Join blocks of elements (kind, part ids, node ids), and add all nodes that have coordinates."""
         blocks = [block for block in blocks if len(block[1])]
         kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in blocks})
         blocks_by_kind = [
@@ -327,7 +327,7 @@ class Mesh(NamedTuple):
 
     @property
     def kinds(self) -> Mapping[int, set[str]]:
-        """Return the kinds of elements of each part, keyed by part id."""
+        """Return the element kinds of each part, keyed by part id."""
         kinds_by_part: dict[int, set[str]] = {}
         for elements in self.elements:
             for part in np.unique(elements.part).tolist():
@@ -335,7 +335,7 @@ class Mesh(NamedTuple):
         return kinds_by_part
 
     def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
-        """Yield notes on elements of undefined parts and on nodes without coordinates.
+        """Yield notes on elements of undefined parts, and on nodes without coordinates.
 
         ``sign`` begins the keywords.
         """
@@ -346,7 +346,7 @@ class Mesh(NamedTuple):
 
 
 class _RadiossElementKind(NamedTuple):
-    """Kind of Radioss element: its name, the nodes that define its size, and the number of ids on each of its lines."""
+    """A Radioss element kind: its name, the nodes that define its size, and the number of ids per line."""
 
     name: str
     nodes: int
@@ -398,14 +398,14 @@ def read_elements(
 
 
 def find_parts_with_elements(starter: Starter) -> set[int]:
-    """Return the parts that have elements of any kind."""
+    """Return the parts that have any elements."""
     return {part for part, _ in _read_element_blocks(starter)}
 
 
 def find_parts_within(
     starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Return the parts whose nodes all belong to a group of nodes and parts, keyed by group."""
+    """Return, for each group of nodes and parts, the parts whose nodes all belong to the group."""
     elements = [*_read_element_blocks(starter)]
     inside: dict[int, set[int]] = {}
     for key, (nodes, parts) in groups.items():
@@ -422,7 +422,7 @@ def find_parts_within(
 
 
 def _read_element_blocks(starter: Starter) -> Iterator[tuple[int, Integers]]:
-    """Yield part ids and node ids of elements, block by block; the node id is 0 if the lines cannot be read."""
+    """Yield part ids and node ids of elements, block by block; the node ids are 0 if the lines cannot be read."""
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-# Assumed number of integration points through the thickness of a shell; most shells have 2 to 5.
+# Number of integration points through the thickness that is assumed for a shell; most shells have 2 to 5.
 _LAYERS: Final = 3
 SPRING: Final = "spring"
-# Kinds of elements that stay deformable when their part is switched to rigid.
+# Element kinds that stay deformable when their part is made rigid.
 DISCRETE: Final = frozenset({SPRING, "seatbelt"})
 _NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
 
@@ -55,7 +55,7 @@ class Hold(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Gravity along a global ``axis`` (None for a local axis), with the ``values`` at which its load curve is constant.
+    """Gravity along a global ``axis`` (None: a local axis), with the ``values`` at which its load curve is constant.
 
     ``values`` are accelerations [length/time^2]. It acts on ``nodes`` (ids, or places) and ``parts``; None: on all
     nodes.
@@ -100,7 +100,7 @@ class Boundary(NamedTuple):
     def of(
         cls, holds: Sequence[Hold | str], loads: Sequence[Gravity | str], *, whole: bool
     ) -> Boundary:
-        """Separate supports and gravity from notes (strings); gravity is unknown if the deck is not ``whole``."""
+        """Separate supports and gravity from notes (strings); gravity is unknown unless the deck is ``whole``."""
         gravity = tuple(load for load in loads if isinstance(load, Gravity))
         is_known = whole and len(gravity) == len(loads)
         notes = tuple(note for note in (*holds, *loads) if isinstance(note, str))
@@ -111,7 +111,7 @@ class Boundary(NamedTuple):
         )
 
     def placed(self, table: NodeTable) -> Boundary:
-        """Return the boundary with node indices in place of node ids."""
+        """Return the same boundary with node indices in place of node ids."""
         return Boundary(
             place_nodes(self.holds, table),
             self.gravity and place_nodes(self.gravity, table),
@@ -126,7 +126,7 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 
 def place_nodes(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
-    """Replace node ids with indices in the table; drop nodes that are not in the table."""
+    """Replace node ids by indices in the table; drop nodes that are not in the table."""
     # The nodes of a joint are never None, which mypy cannot infer for this type.
     return tuple(
         load if load.nodes is None else load._replace(nodes=table.known(load.nodes))  # type: ignore[redundant-expr]
@@ -161,7 +161,7 @@ def find_plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]
 
 
 class Formulation(NamedTuple):
-    """Formulation of the elements of a part: its name, and the class that determines the element cost.
+    """Formulation of the elements of a part: its name, and the class that determines the cost per element.
 
     ``cost`` is a key of the weights, or None if it is unknown. ``measured``: the weight was measured for this
     formulation, not for a similar one. ``in_plane`` is the number of integration points in each layer of a shell.
@@ -190,7 +190,7 @@ class Material(NamedTuple):
 
 
 class Section(NamedTuple):
-    """Section of a part: formulations by kind of element, shell thickness, beam area, spring properties.
+    """Section of a part: formulation of each element kind, shell thickness, beam area, spring properties.
 
     ``turns`` is False if the stresses of its solids do not rotate with a rigid body. ``damped`` is None if it is
     unknown. ``mass`` and ``stiffness`` are those of one spring; the stiffness is None if it is not constant. ``layers``
@@ -208,7 +208,7 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """Data of one part without its elements; ``unswitchable`` is the reason not to switch the part, or empty."""
+    """Data of one part without its elements; ``unswitchable`` is the reason not to switch the part, if any."""
 
     id: int
     title: str
@@ -283,20 +283,20 @@ class Inventory:
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
-        """Return the number of elements of each kind in each part, keyed by part id."""
+        """Return the number of elements per part and kind, keyed by part id."""
         counts: dict[int, Counter[str]] = {}
         for elements in self.elements:
             _count_elements(elements.kind, elements.part, counts)
         return counts
 
     def formulation(self, part: int, kind: str) -> Formulation:
-        """Return the formulation of a kind of element in a part; its cost is None if the deck does not define it."""
+        """Return the element formulation of one kind in a part; its cost is None if the deck does not define it."""
         data = self.parts.get(part)
         formulation = data.section.formulations.get(kind) if data else None
         return formulation or Formulation(kind, None, measured=False)
 
     def further_points(self, part: int, kind: str) -> int:
-        """Return the number of integration points of a shell element in all layers but the first.
+        """Return the number of integration points of a shell element in all layers except the first.
 
         0 for other elements.
         """
@@ -359,7 +359,7 @@ class Inventory:
 
     @cached_property
     def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """Return the parts connected to each part by springs, which let them move relative to it, keyed by part id."""
+        """Return the parts that springs connect to each part and let move relative to it, keyed by part id."""
         ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
         return self._held_by(
             [
@@ -398,7 +398,7 @@ class Inventory:
 
     @cached_property
     def ready(self) -> tuple[frozenset[int], ...]:
-        """Return, for each rigid body in ``switched``, the parts that belong to it completely, without springs."""
+        """Return, for each rigid body in ``switched``, the non-spring parts that belong to it completely."""
         whole_parts = []
         for _, nodes, parts in self.switched:
             mask = self._mask(parts)
@@ -408,7 +408,7 @@ class Inventory:
         return tuple(whole_parts)
 
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Return the rigid bodies that these parts form; parts connected by nodes, joints or springs form one body.
+        """Return the rigid bodies formed by these parts; parts connected by nodes, joints or springs form one body.
 
         A car with its engine on mounts is one body. Engine, battery and wheels alone are several, like loose wheels. If
         all parts of a rigid body of the deck (attribute `switched`) are among these parts, they form one body. Springs
@@ -447,11 +447,11 @@ class Inventory:
         )
 
     def _discrete(self, part: int) -> bool:
-        """Return True if a part consists of springs. Springs form no rigid body, but move with one."""
+        """Return True if a part consists of springs. Springs do not form a rigid body, but move with one."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Return the groups of these parts that share nodes or are joined, directly or indirectly."""
+        """Return groups of these parts that share nodes or are joined, directly or indirectly."""
         return _group_linked(parts, self._linked)
 
     def _linked(self, part: int) -> Iterable[int]:
@@ -459,11 +459,11 @@ class Inventory:
         return self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()
 
     def rigid_nodes(self, parts: Iterable[int]) -> int:
-        """Return the number of nodes of given parts."""
+        """Return the number of nodes of the given parts."""
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the numbers of elements that are rigid once these parts are rigid bodies, keyed by part id and kind.
+        """Return the number of elements that are rigid once these parts are rigid bodies, per part id and kind.
 
         Radioss deactivates every element whose nodes all lie in a body, LS-DYNA the elements of the switched parts.
         """
@@ -476,7 +476,7 @@ class Inventory:
         return counts_by_part
 
     def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Return the numbers of elements whose nodes all belong to these parts, keyed by part id and kind."""
+        """Return the number of elements whose nodes all belong to these parts, per part id and kind."""
         # The index NO_NODE is -1, and therefore selects this last entry.
         inside = np.append(self._mask(parts), True)
         counts_by_part: dict[int, Counter[str]] = {}
@@ -489,7 +489,7 @@ class Inventory:
         return counts_by_part
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
-        """Return a mask (nodes,) of the nodes of given parts."""
+        """Return a mask (nodes,) of the nodes of the given parts."""
         mask = np.zeros(len(self.coordinates), bool)
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True
@@ -497,7 +497,7 @@ class Inventory:
 
 
 def _count_elements(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
-    """Add elements of one kind to the element counts of their parts."""
+    """Add elements of one kind to the element counts of the parts."""
     for part, count in zip(
         *(values.tolist() for values in np.unique(parts, return_counts=True)),
         strict=True,

@@ -1,4 +1,4 @@
-"""Write part sets: a card refers to a *SET_PART_LIST if it has too many parts to list."""
+"""Write part sets, to which a card refers if it has too many parts to list."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_LISTED: Final = 10
 def number_sets(
     groups: Iterable[Sequence[int]], first: int
 ) -> dict[tuple[int, ...], int]:
-    """Return part set ids for all groups with too many parts to list, keyed by the sorted tuple of part ids."""
+    """Return part set ids for all groups of parts that are too large to list, keyed by the sorted tuple of part ids."""
     long_groups = dict.fromkeys(
         tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED
     )

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Cached numbers of the connected piece of each node; they are cached because a mesh may have millions of nodes.
+# Numbers of the connected pieces by node; they are cached, because a mesh may have millions of nodes.
 _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
     WeakKeyDictionary()
 )
 
-# Kinds of elements whose nodes have no rotational degrees of freedom.
+# Element kinds whose nodes have no rotational degrees of freedom.
 _UNTURNED: Final = {
     "solid",
     "tetrahedron",
@@ -43,16 +43,16 @@ _UNTURNED: Final = {
     "thick shell",
     "particle",
 }
-# Largest distance of a node on a plane from the plane, as a fraction of the size of the connected piece [-].
+# Nodes up to this distance from a plane are on it, as a fraction of the size of the connected piece [-].
 _FLAT: Final = 1e-6
-# Smallest mass of a piece that moves other pieces on springs, as a fraction of the mass of all these pieces [-].
+# Smallest mass of a piece that moves other pieces on springs, as a fraction of the total mass of these pieces [-].
 _HEAVY: Final = 0.05
 
 
 def count_pieces(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
 ) -> int:
-    """Return the number of disconnected pieces of the mesh of given parts; 0 if there are no elements.
+    """Return the number of disconnected mesh pieces of the given parts; 0 if there are no elements.
 
     ``among`` are the parts that may connect them, by default the parts themselves. Joints and springs always connect.
     """
@@ -64,7 +64,7 @@ def count_pieces(
 def label_pieces(
     inventory: Inventory, parts: frozenset[int], *, springs: bool = True
 ) -> Places:
-    """Return the number of the connected piece to which each node of the deck belongs, shape (nodes,); cached.
+    """Return the number of the connected piece to which each node of the deck belongs, shape (nodes,). It is cached.
 
     Elements of ``parts``, joints and, unless ``springs`` is False, springs connect nodes.
     """
@@ -183,7 +183,7 @@ def _find_held_pieces(
 
 
 def _is_held(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) -> bool:
-    """Return True if a support holds nodes of a piece. Fixed rotations are ignored unless the translations are free."""
+    """Return True if a support holds nodes of a piece. Fixed rotations count only if the translations are free."""
     if not nodes.size or hold.counts:
         return bool(nodes.size)
     return bool(hold.axes - excused) if hold.axes else bool(turned[nodes].any())
@@ -230,7 +230,7 @@ def _find_symmetry_axes(
 
 
 def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bool:
-    """Return True if the fixed nodes are all nodes on a plane that bounds the connected piece."""
+    """Return True if the fixed nodes are exactly the nodes on a plane that bounds the connected piece."""
     plane = heights[fixed][0]
     on_plane = np.abs(heights - plane) <= tolerance
     one_side = heights.min() >= plane - tolerance or heights.max() <= plane + tolerance
@@ -238,16 +238,16 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 
 
 # The code below computes the longest period of connected pieces that oscillate on springs.
-# A piece without inner springs has the mass m; its springs connect it to pieces of total mass M.
-# The reduced mass of a piece of mass m that springs connect to pieces of total mass M is mu = m M/(m + M).
+# A piece without inner springs has mass m, and its springs connect it to pieces of total mass M.
+# The reduced mass of a piece of mass m on springs to pieces of total mass M is mu = m M/(m + M).
 # A spring of stiffness k along the unit vector l adds k l l^T to the stiffness matrix K of the piece.
 # The period of a piece along an eigenvector of K with eigenvalue lambda is 2 pi (mu/lambda)^(1/2).
 # A load is transmitted first in the stiffest direction, so the largest eigenvalue of K determines the period.
-# Replacing the eigenvalue by the trace of K in the formula for the period gives a lower limit of all periods.
+# Replacing the eigenvalue by the trace of K in the formula for the period gives a lower bound on all periods.
 
 
 class InnerPeriod(NamedTuple):
-    """The longest period [time], its lower limit ``least`` [time], and a description of what oscillates."""
+    """The longest period [time], its lower bound ``least`` [time], and a description of what oscillates."""
 
     time: float
     least: float
@@ -255,7 +255,7 @@ class InnerPeriod(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A piece of the mesh that is connected by elements other than springs: its parts and its mass."""
+    """A piece of the mesh that elements other than springs connect: its parts and its mass."""
 
     parts: frozenset[int]
     mass: float

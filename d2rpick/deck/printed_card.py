@@ -1,4 +1,4 @@
-"""Define what the cards of all solvers share: the options of a card, the printed card, and the number format."""
+"""Define what the cards of all solvers share: card options, the printed card, and the number format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # Width of a field [characters].
-# Largest number of characters of a number; a blank separates the number from the next field.
+# Largest number of characters of a number; a space separates the number from the next field.
 LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
@@ -35,12 +35,12 @@ PHYSICS = (
 
 
 class Printing(NamedTuple):
-    """Options of a card besides its times; each solver uses the options that ``Solver.takes`` lists.
+    """Options of a card besides its times; each solver uses the options listed in ``Solver.takes``.
 
     Attributes
     ----------
     solver : str, optional
-        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, or else for LS-DYNA.
+        A key of `SOLVERS`; if it is missing, the card is for the solver that wrote the history, by default LS-DYNA.
     part : tuple of int
         Ids of the parts to switch.
     node : tuple of int
@@ -98,7 +98,7 @@ class Printing(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedCard:
-    """Solver input: the whole ``text``, and ``files`` with the same text under the file names that the solver expects.
+    """Solver input: all of it as ``text``, and split into ``files`` under the file names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` report times that differ from the given times. ``starter`` are cards
     for the starter deck, before its ``/END``. ``sensors`` are the ids of the sensors that switch bodies, by main node.
@@ -130,7 +130,7 @@ class CardSolver(NamedTuple):
 
 
 def write_number(value: float, width: int = LONGEST) -> str:
-    """Return the shortest text of at most ``width`` characters that reads back as the number.
+    """Return the shortest text of at most ``width`` characters that the solver reads back as the number.
 
     If there is none, return the text that reads back as the nearest number.
 
@@ -154,7 +154,7 @@ def write_number(value: float, width: int = LONGEST) -> str:
         raise DeckError(
             f"{value:g} cannot be written in {width} columns; give a number that fits"
         )
-    # An exact text is preferred, then a text with digits on both sides of the point, then a short text.
+    # An exact representation comes first, then one with digits on both sides of the decimal point, then a short one.
     return min(
         fitting,
         key=lambda text: (
@@ -167,7 +167,7 @@ def write_number(value: float, width: int = LONGEST) -> str:
 
 
 def write_comments(remarks: Sequence[str]) -> Iterator[str]:
-    """Yield remarks as lines that fit into the comment lines of a card."""
+    """Yield remarks as lines short enough for the comment lines of a card."""
     for remark in remarks:
         yield from textwrap.wrap(
             make_printable(remark),
@@ -197,7 +197,7 @@ def refuse_overlapping_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
-    """Return the distinct ids; raise DeckError if no id is given, or if an id needs more than ``digits`` columns."""
+    """Return the distinct ids; raise DeckError if there are none, or if an id needs more than ``digits`` columns."""
     if not ids:
         raise DeckError(
             "no id of a part or body to switch was given, expected at least one"

@@ -1,4 +1,4 @@
-"""Print switching windows as solver input, with one function per solver and one table of solvers.
+"""Print rigid windows as solver input, with one function per solver and a table of the solvers.
 
 LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
 times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE values that wait for the end of a force, and for a force, keyed by kind of contact.
+# CODE values that wait until a force ends and until a force acts, keyed by kind of contact.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -86,14 +86,14 @@ _OF_SENSORS = tuple(
     for line in _OF_RADIOSS[1:-1]
     if not line.startswith(("The starter looks", "A body that"))
 )
-# Solver for a history whose format does not identify the solver.
+# Solver that is assumed if the format of a history does not identify one.
 DEFAULT: Final = "ls-dyna"
 
 
 def _print_ls_dyna(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print two unpaired CODE 0 sets for each window; their times have at most 9 characters.
+    """Print two unpaired CODE 0 sets per window, with times of at most 9 characters.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id on the same line, separated by a blank.
+        # The lead id follows another id on the same line, with a space in between.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -140,7 +140,7 @@ def _write_window(
     printing: Printing,
     part_sets: PartSets,
 ) -> Iterator[str]:
-    """Yield the lines of the two switch sets of one window."""
+    """Yield the lines of the two switch sets for one window."""
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
     yield from write_set_pair(sets, texts, write_number(cap), ids, printing, part_sets)
 
@@ -148,7 +148,7 @@ def _write_window(
 def _print_ls_dyna_contact(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or of a rigid wall (CODE 1 and 3).
+    """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or a rigid wall (CODE 1 and 3).
 
     The windows of the card are those in which the pair switches in the history.
 
@@ -202,7 +202,7 @@ def _print_ls_dyna_contact(
 def _number_switch_sets(
     first: tuple[int, int], count: int
 ) -> Iterator[tuple[int, int]]:
-    """Yield the ids of the two switch sets of each window; all ids are different."""
+    """Yield the ids of the two switch sets for each window; all ids are different."""
     if first[0] == first[1]:
         raise DeckError(f"both switch sets have id {first[0]}; give two different ids")
     above = max(first) + 1
@@ -220,7 +220,7 @@ def _check_printed(texts: Sequence[str]) -> None:
 
 
 def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
-    """Yield a note for each time that the card cannot write exactly."""
+    """Yield a note for each time that the card cannot represent exactly."""
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
             error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
@@ -251,7 +251,7 @@ def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
 def _print_radioss(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
 ) -> PrintedCard:
-    """Print engine files: one engine run up to each switch, and one to the end of the run.
+    """Print engine files: one engine run up to each switch, and one up to the end of the run.
 
     The main nodes are those of /RBODY in the starter deck, for bodies without sensor. If no limit is given, the time
     step is at most 1/1000 of the rigid window while the bodies are rigid.
@@ -326,7 +326,7 @@ def _print_radioss_contact(
 
 
 def _find_force(printing: Printing) -> tuple[str, int, Pushes]:
-    """Return kind, id and contact times of the contact or wall whose force switches the bodies.
+    """Return the kind, id and contact times of the contact or wall whose force switches the bodies.
 
     Raises
     ------
@@ -372,7 +372,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # The note is also written to the file, because the file may be used without the card.
+    # The note is written to the file as well, because the file may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",
@@ -405,7 +405,7 @@ def _print_sensors(
 def _write_sensors(
     spans: Sequence[Times], first: int, force: tuple[str, int, float] | None = None
 ) -> tuple[str, int]:
-    """Return the text of sensors, whose ids begin with ``first``, and the id of the sensor that combines all of them.
+    """Return the text of sensors with ids from ``first`` on, and the id of the sensor that combines them all.
 
     The combining sensor is active in each of ``spans``, and while a ``force`` acts, given by the arguments of
     `write_force_sensor`.
@@ -506,7 +506,7 @@ SOLVERS: Final[Mapping[str, CardSolver]] = {
 
 
 def find_solver(history_format: str) -> str:
-    """Return the solver that wrote a history of this format; several formats are joined by ``+``.
+    """Return the solver that wrote a history in this format; several formats are joined by ``+``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Write the rigid bodies that a Radioss deck lacks, as cards for its starter deck: one /RBODY per group of parts.
+"""Write the rigid bodies that a Radioss deck lacks as cards for its starter deck, one /RBODY per group of parts.
 
 Source: Altair's public help for /RBODY, /GRNOD, /INIVEL and /GRAV, and runs computed with OpenRadioss: gravity and
 initial velocities act on a rigid body only through its main node.
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.radioss_rigid import Body
 
-# Value of Ikrem for which the starter keeps the nodes of a body in rigid walls.
+# Value of Ikrem with which the starter keeps the nodes of a body in rigid walls.
 _STAYS: Final = 1
 # Column of the node group in the first line below the title, keyed by keyword of the initial velocity.
 _GROUP_OF_VELOCITY: Final = dict.fromkeys(
@@ -60,7 +60,7 @@ _GROUP_OF_GRAVITY: Final = GRAVITY["grnod_ID"]
 
 
 class SwitchedBodies(NamedTuple):
-    """The rigid bodies that switch given parts, and the cards of the new bodies among them.
+    """The rigid bodies that switch the given parts, and the cards of the bodies among them that are new.
 
     ``nodes`` are all their main nodes. ``cards`` are the cards that the starter deck lacks, to be inserted before its
     /END; empty if it lacks none. ``notes`` describe these cards. ``sensor`` and all ids above it are free for sensors.
@@ -75,7 +75,7 @@ class SwitchedBodies(NamedTuple):
 
 
 def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
-    """Find the rigid bodies of given parts in a Radioss deck, and write the missing ones.
+    """Find the rigid bodies of the given parts in a Radioss deck, and write the missing ones.
 
     A new body has a new main node at the centre of mass of its parts, and all their nodes (/GRNOD/PART). The main node
     is added to the node groups of initial velocities and gravity. Bodies are on by default, so the first engine run has
@@ -133,7 +133,7 @@ def find_bodies(path: str, parts: Collection[int]) -> SwitchedBodies:
 
 
 def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
-    """Return the bodies that are inactive throughout the run and share nodes with new bodies in ``cards``.
+    """Return the bodies that are inactive throughout the run and share nodes with the new bodies in ``cards``.
 
     A node belongs to one body, so these bodies have to be removed from the starter deck.
     """
@@ -156,12 +156,12 @@ def find_replaced_bodies(run: RadiossRun, cards: str) -> tuple[Body, ...]:
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
-    """Return True if a body is never rigid; ``unused`` contains main nodes of bodies that no engine run activates."""
+    """Return True if a body is never rigid; ``unused`` contains main nodes that no engine run activates."""
     return body.node.value in unused and not body.sensor
 
 
 def _describe_pieces(inventory: Inventory, parts: Sequence[int]) -> str:
-    """Return a remark if the body of these parts joins mesh pieces that have no other connection."""
+    """Return a remark if the rigid body of these parts joins mesh pieces that are not otherwise connected."""
     pieces = count_pieces(inventory, parts)
     if pieces > 1:
         return f"; it joins {pieces} pieces that nothing else connects"
@@ -176,7 +176,7 @@ def _select_stiff_parts(inventory: Inventory, parts: Collection[int]) -> list[in
 
 
 def _collect_nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
-    """Return the ids of all nodes of given parts."""
+    """Return the ids of all nodes of the given parts."""
     return frozenset(
         node
         for part in parts
@@ -222,7 +222,7 @@ def _find_ready_bodies(
     groups: NodeGroups,
     unused: Collection[int],
 ) -> tuple[int, ...]:
-    """Return the main nodes of those bodies in the deck that contain exactly a group of parts.
+    """Return the main nodes of the bodies in the deck that contain exactly the given parts.
 
     Empty if no body contains any of their nodes, or only bodies that are never rigid, which a new one replaces.
     """
@@ -294,7 +294,7 @@ class _BodyWriter:
         self._free = {"NODE": int(read_nodes(starter.named("NODE"))[0].max(initial=0))}
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
-        """Return the main node of a new rigid body of given parts, and its cards with velocity and gravity."""
+        """Return the main node of a new rigid body of the given parts, and its cards with velocity and gravity."""
         node = self.next("NODE")
         group = self.next("GRNOD")
         alone = self.next("GRNOD")
@@ -358,7 +358,7 @@ class _BodyWriter:
         )
 
     def _moving(self, parts: Sequence[int], alone: int) -> Iterator[str]:
-        """Yield the initial velocities and gravity that act on the nodes of the body, for its main node."""
+        """Yield cards that apply the initial velocities and the gravity of the body's nodes to its main node."""
         body_nodes = _collect_nodes(parts, self._groups)
         for card in self._starter.named("INIVEL"):
             column = _GROUP_OF_VELOCITY.get("".join(card.words[1:2]))
@@ -377,7 +377,7 @@ class _BodyWriter:
                 yield self._again(card, _GROUP_OF_GRAVITY, alone)
 
     def _reached(self, card: Card, column: CardColumn | None) -> frozenset[int]:
-        """Return the nodes of the group in a column of a card, or the nodes that the card lists.
+        """Return the nodes of the group whose id is in a column of a card, or the nodes that the card lists itself.
 
         Empty if a card has no group.
         """
@@ -394,7 +394,7 @@ class _BodyWriter:
         return members
 
     def _again(self, card: Card, column: CardColumn, group: int) -> str:
-        """Return a copy of a card with a new id and another node group."""
+        """Return a copy of a card with a new id and a different node group."""
         title, first, *further_lines = (row.text for row in card.rows)
         at = 1 + (card.words[0] == "INIVEL")
         head = "/".join(

@@ -12,7 +12,7 @@ from d2rpick.deck.columns import DataLine, blank, integers, reals, words
 
 _REAL: Final = 20  # Width of the column of a real number [characters].
 
-# Lines of /BEGIN: the version of the input, and a line of units.
+# Lines of /BEGIN: the version of the input, and a line with units.
 BEGIN: Final = DataLine(integers("Invers"))
 UNITS: Final = DataLine(words("Mass Length Time", _REAL))
 
@@ -34,7 +34,7 @@ RIGID_PART: Final = DataLine(integers("node_ID"), blank(40), integers("sens_ID")
 
 MERGE: Final = DataLine(integers("main_ID M_type secon_ID S_type"))
 NODE: Final = DataLine(integers("node_ID"), reals("X Y Z", _REAL))
-# Line of ids of /GRNOD, /SUBSET and /SURF/PART, which also fits the first id of /INIVEL/NODE and of /TH/NODE.
+# Line of ids in /GRNOD, /SUBSET and /SURF/PART; it also fits the first id of /TH/NODE and /INIVEL/NODE.
 # In /TH/NODE, the second number is the skew system.
 ID_LIST: Final = DataLine(integers("ID1 ID2 ID3 ID4 ID5 ID6 ID7 ID8 ID9 ID10"))
 
@@ -43,13 +43,13 @@ WALL: Final = DataLine(integers("node_ID Slide grnd_ID1 grnd_ID2 Iform"))
 WALL_SIZES: Final = DataLine(reals("d fric Diameter", _REAL))
 POINT: Final = DataLine(reals("X Y Z", _REAL))
 
-# Lines of /INIVEL with a node group; with AXIS the group is on a line of its own above the velocities.
+# Lines of /INIVEL with a node group; with AXIS, the group has a separate line above the velocities.
 VELOCITY: Final = DataLine(reals("Vx Vy Vz", _REAL), integers("grnod_ID"))
 AXIS_GROUP: Final = DataLine(integers("Dir frame_ID grnod_ID"))
 AXIS_VELOCITY: Final = DataLine(reals("Vx Vy Vz Vr", _REAL))
 VELOCITY_START: Final = DataLine(reals("Tstart", _REAL), integers("sens_ID"))
 
-# Lines of /GRAV and of the prescribed motions /IMPVEL, /IMPDISP and /IMPACC, also with FGEO.
+# Lines of /GRAV and of the prescribed motions /IMPVEL, /IMPDISP and /IMPACC, with or without FGEO.
 GRAVITY: Final = DataLine(
     integers("fct_ID"),
     words("Dir"),
@@ -60,7 +60,7 @@ GRAVITY: Final = DataLine(
 MOTION_TIMES: Final = DataLine(reals("Ascale_x Fscale_y Tstart Tstop", _REAL))
 FREE_MOTION: Final = DataLine(integers("fct_ID part_ID"))
 
-# Line of /BCS: three digits for translations and three for rotations precede the skew.
+# Line of /BCS: three digits for the translations and three for the rotations, followed by the skew.
 SUPPORT: Final = DataLine(
     blank(3),
     words("Tra", 3),
@@ -71,11 +71,11 @@ SUPPORT: Final = DataLine(
 FUNCTION_POINT: Final = DataLine(reals("X Y", _REAL))
 INTERFACE: Final = DataLine(integers("grnod_ID surf_ID"))
 
-# Lines of /MAT: the density, and the elastic constants below it.
+# Lines of /MAT: the density, and below it the elastic constants.
 DENSITY: Final = DataLine(reals("rho", _REAL))
 ELASTIC: Final = DataLine(reals("E nu", _REAL))
 
-# Lines of /PROP: flags of solids and shells, thickness of shells, area of beams and trusses, spring constants.
+# Lines of /PROP: flags of solids and shells, shell thickness, area of beams and trusses, spring constants.
 SOLID_FLAGS: Final = DataLine(
     integers("Isolid Ismstr Icpre Itetra10 Inpts Itetra4 flag7 Iframe")
 )
@@ -85,7 +85,7 @@ SPRING_MASS: Final = DataLine(reals("Mass", _REAL))
 SPRING: Final = DataLine(reals("K C", _REAL))
 SPRING_FUNCTION: Final = DataLine(words("fct_ID1"))
 
-# Lines of /SENSOR of each kind below the title.
+# Lines below the title of each kind of /SENSOR.
 DELAY: Final = DataLine(reals("Tdelay", _REAL))
 STOP: Final = DataLine(reals("Tstop", _REAL))
 SENSOR_INPUTS: Final = DataLine(integers("sens_ID1 sens_ID2"))
@@ -95,7 +95,7 @@ FORCE_SENSOR: Final = DataLine(
 # A second number after Tdelay on the same line, which the solver does not read.
 AFTER_DELAY: Final = DataLine(blank(_REAL), words("number", _REAL))
 
-# Line of /RUN in an engine file.
+# Line of a /RUN in an engine file.
 RUN: Final = DataLine(reals("Tstop", _REAL))
 
 

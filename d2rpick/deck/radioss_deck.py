@@ -1,4 +1,4 @@
-"""Read keyword blocks of Radioss files: engine runs in engine files, switched bodies, and the starter deck.
+"""Read keyword blocks of Radioss files: the engine runs, the bodies that they switch, and the starter deck.
 
 A block is a line that begins with ``/`` with the data lines below it. Columns of the starter deck: Altair's public help
 for /RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
-_DIGITS = 10  # Largest number of digits of an id.
+_DIGITS = 10  # Maximum number of digits in an id.
 
-# Kinds of elements whose stresses do not rotate with a rigid body.
+# Element kinds whose stresses do not rotate with a rigid body.
 WITHOUT_FRAME: Final = {
     "TETRA4",
     "TETRA10",
@@ -52,7 +52,7 @@ WITHOUT_FRAME: Final = {
 }
 _RIGID_PARTS_SINCE: Final = 2612  # First input version with Irigid in /PART.
 _ICOROTATIONAL: Final = 2  # Value of Iframe that selects a co-rotational frame.
-# Values of Isolid of bricks without a co-rotational frame (12 according to the help up to 2017).
+# Values of Isolid that select bricks without a co-rotational frame (including 12, by the help up to 2017).
 _NOT_TURNED: Final = {
     1,
     2,
@@ -63,7 +63,7 @@ SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
 
 def read_blocks(source: SourceFile) -> Iterator[Block]:
-    """Yield keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
+    """Yield keyword blocks and ``#include`` lines in file order, up to ``/END``."""
     start: tuple[int, str] | None = None
     for position, raw in _find_marks(source):
         if start:
@@ -76,7 +76,7 @@ def read_blocks(source: SourceFile) -> Iterator[Block]:
 
 
 def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
-    """Yield offset and text of the lines that begin with ``/`` or ``#include``.
+    """Yield the offset and text of each line that begins with ``/`` or ``#include``.
 
     Lines of a mesh are not looked at one by one.
     """
@@ -87,7 +87,7 @@ def _find_marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
 
 
 def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
-    """Return offset and text of the lines in this block of text that begin with ``/`` or ``#include``."""
+    """Return the offset and text of each line in this block that begins with ``/`` or ``#include``."""
     offsets = [0] if lines[:1] in (b"/", b"#") else []
     for mark in (b"\n/", b"\n#"):
         at = lines.find(mark)
@@ -105,7 +105,7 @@ def _find_marks_in_piece(lines: bytes) -> list[tuple[int, bytes]]:
 
 
 def split_keyword(block: Block) -> tuple[str, ...]:
-    """Return the words of a keyword line in upper case; empty for an ``#include``.
+    """Return the words of a keyword line in upper case; no words for an ``#include``.
 
     The run name in ``/RUN/name/1`` is in upper case too; `Card.block` has it as written.
     """
@@ -126,7 +126,7 @@ def make_card(block: Block) -> Card:
 
 
 def get_number(card: Card, at: int = 1) -> int:
-    """Return the id at a position of a keyword; 0 if there is no id."""
+    """Return the id at a given position in a keyword; 0 if there is no id."""
     return parse_id("".join(card.words[at:][:1]))
 
 
@@ -136,7 +136,7 @@ def get_lines_below_title(card: Card) -> tuple[Row, ...]:
 
 
 class InitialVelocity(NamedTuple):
-    """An /INIV card: initial velocities of an engine run for ranges of nodes or a group (0 if there is no group)."""
+    """An /INIV card: initial velocities in an engine run for ranges of nodes or a group (0 if there is no group)."""
 
     card: Card
     ranges: tuple[tuple[int, int], ...]
@@ -145,20 +145,20 @@ class InitialVelocity(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class RadiossLeg:
-    """One engine run: name and number from /RUN, its end, its switched main nodes, and its time-step limit."""
+    """One engine run: its name and number from /RUN, its end, its switched main nodes, and its time-step limit."""
 
     run: Card
     name: str
     number: int
     stop: Value[float]
-    # Switching cards, each with True if it makes bodies rigid, and with the main nodes of these bodies.
+    # Switching cards, each with the main nodes of its bodies, and True if the card makes these bodies rigid.
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
         default_factory=list
     )
     cap: Value[float] | None = None
     version: str = ""
     starts: list[InitialVelocity] = field(default_factory=list)
-    # Ids of the sensors that are reset at the start of the engine run.
+    # Ids of the sensors that are reset when the engine run starts.
     resets: list[int] = field(default_factory=list)
     sensor: int = 0  # Id of a sensor that ends the engine run at an unknown time, or 0.
 
@@ -195,7 +195,7 @@ def find_bodies_kept_off(legs: Sequence[RadiossLeg]) -> tuple[int, ...]:
 
 
 def _begin_leg(card: Card) -> RadiossLeg:
-    """Begin an engine run at its /RUN card."""
+    """Start an engine run at its /RUN card."""
     missing = Value(0.0, card.here, "the end time is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
     return RadiossLeg(
@@ -204,7 +204,7 @@ def _begin_leg(card: Card) -> RadiossLeg:
 
 
 def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
-    """Add a card of an engine file to its engine run."""
+    """Add a card in an engine file to its engine run."""
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append(
@@ -227,7 +227,7 @@ def _add_to_leg(leg: RadiossLeg, card: Card) -> None:
 
 
 def _read_start(card: Card) -> InitialVelocity:
-    """Read the nodes of an /INIV; type 0 lists nodes, type 1 ranges of nodes, and type 2 a node group.
+    """Read the nodes of an /INIV; type 0 lists nodes, type 1 node ranges, and type 2 a node group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
@@ -247,7 +247,7 @@ def _read_start(card: Card) -> InitialVelocity:
 
 
 def read_numbers(card: Card) -> Iterator[Value[float]]:
-    """Yield all numbers below a keyword, which are in free format."""
+    """Yield all numbers below a keyword; they are in free format."""
     for distance, line in card.block.lines():
         column = 0
         for word in line.split():
@@ -278,7 +278,7 @@ class PartLine(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Starter:
-    """A starter deck: its ``blocks`` in reading order, from the files ``sources``."""
+    """A starter deck: its ``blocks`` in reading order from the files ``sources``."""
 
     sources: list[SourceFile] = field(default_factory=list)
     blocks: list[Block] = field(default_factory=list)
@@ -294,14 +294,14 @@ class Starter:
 
     @cached_property
     def version(self) -> int:
-        """Return the input version of /BEGIN; 0 if the deck names no version."""
+        """Return the input version given in /BEGIN; 0 if the deck gives no version."""
         begin_cards = [card for card in self.named("BEGIN") if card.rows]
         rows = get_lines_below_title(begin_cards[-1]) if begin_cards else ()
         return begin_cards[-1].integer(rows[0], BEGIN["Invers"]).value if rows else 0
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """Return the rigid bodies, each with all bodies that are merged into it.
+        """Return the rigid bodies, each with all bodies merged into it.
 
         A body of /RBODY/LAGMUL, whose keyword has its id elsewhere, is never switched.
         """
@@ -309,7 +309,7 @@ class Starter:
 
     @cached_property
     def rigid(self) -> RigidBodies:
-        """Return the rigid bodies in the form that the engine uses."""
+        """Return the rigid bodies as the engine uses them."""
         written = [*self._written_bodies(), *self._bodies_of_parts()]
         return make_rigid_bodies(written, [*self._merges()], self._last_node)
 
@@ -386,7 +386,7 @@ class Starter:
 
     @cached_property
     def subsets(self) -> Mapping[int, tuple[int, ...]]:
-        """Return the ids of the subsets in each subset."""
+        """Return the ids of the subsets contained in each subset."""
         return {
             get_number(card): _read_ids(get_lines_below_title(card))
             for card in self.named("SUBSET")
@@ -414,7 +414,7 @@ class Starter:
 
     @property
     def moved(self) -> bool:
-        """Return True if a submodel may offset ids."""
+        """Return True if a submodel may add an offset to ids."""
         # The keyword //SUBMODEL has no word between its two slashes.
         return bool(self.named(""))
 
@@ -488,7 +488,7 @@ class Starter:
         return nodes, parts
 
     def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
-        """Yield the nodes of the deck that lie in ranges, given as pairs of first and last node."""
+        """Yield the nodes of the deck that lie in ranges given as pairs of first and last node."""
         ranges = [
             range(first, last + 1)
             for first, last in zip(ends[::2], ends[1::2], strict=False)
@@ -504,7 +504,7 @@ class Starter:
                 yield part
 
     def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
-        """Return the kind and the ids of the members of a group."""
+        """Return the kind of the members of a group, and their ids."""
         return self.groups.get(group, ("", ()))
 
     def _groups_in(self, group: int) -> tuple[int, ...]:
@@ -521,11 +521,11 @@ def _read_isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 
 def _read_ids(rows: Iterable[Row]) -> tuple[int, ...]:
-    """Return the ids on lines with fields of 10 columns; -1 for a string that is not an id."""
+    """Return the ids on lines of 10-column fields; -1 for text that is not an id."""
     cells = [cell for row in rows for cell in cut_fields(row.text)]
     return tuple(parse_id(cell) or -1 for cell in cells if cell)
 
 
 def read_reals(row: Row, columns: Iterable[CardColumn]) -> list[float]:
-    """Read the numbers in the columns of a line: 0 for a blank, NaN for text that is not a number."""
+    """Read the numbers in the columns of a line: 0 for a blank field, NaN for text that is not a number."""
     return [parse_real(column.cut(row.text)) for column in columns]

@@ -1,4 +1,4 @@
-"""Recognise the files of a Radioss run, and name its possible flaws, without reading the deck."""
+"""Recognise the files of a Radioss run and name its possible flaws without reading the deck."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ RUINS: Final = {
     LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
-# Number of bytes at the beginning of a file by which the file is recognised.
+# Number of bytes at the beginning of a file from which the file is recognised.
 HEAD: Final = 256 * 1024
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# These patterns of Radioss keywords are compiled at their first use, to keep start-up fast.
+# These patterns of Radioss keywords are compiled on first use to keep start-up fast.
 STARTER: Final = rb"(?mi)^/BEGIN"
 ENGINE: Final = rb"(?mi)^/RUN/"
 _NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
@@ -63,7 +63,7 @@ def list_run_files(path: str) -> list[str]:
         if not os.path.isfile(path):  # noqa: PTH113  pathlib would slow down start-up
             return []  # A pipe can be read only once.
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123  pathlib would slow down start-up
-            # Reading into a buffer larger than the file takes ten times as long.
+            # Reading a file into a buffer larger than the file takes ten times as long.
             head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
         if not is_radioss(head):
             return []
@@ -87,7 +87,7 @@ def list_run_files(path: str) -> list[str]:
 
 
 def find_root(path: str) -> str:
-    """Return the common beginning of the file names of a run: ``NAME`` for ``NAME_0001.rad``; otherwise empty.
+    """Return the common beginning of a run's file names, such as ``NAME`` for ``NAME_0001.rad``; otherwise empty.
 
     The engine looks for the restart file whose name begins like its own file, whatever the name in /RUN is. Source:
     runs computed with OpenRadioss.
@@ -97,7 +97,7 @@ def find_root(path: str) -> str:
 
 
 def _find_run_name(path: str, head: bytes) -> str:
-    """Return the name of a run from its file name, or else from the content of the file."""
+    """Return the run name from the name of a file or, failing that, from its content."""
     if root := find_root(path):
         return root
     match = re.search(_NAME, head)

@@ -1,4 +1,4 @@
-"""Find flaws that ruin a Radioss run with switched rigid bodies, although the starter at most warns about them.
+"""Find flaws that ruin a Radioss run with switched rigid bodies although the starter at most issues a warning.
 
 Source: the published source of OpenRadioss at bd4557ba7 (kinchk.F, checkrby.F, hm_read_rwall_*.F, lecinv.F), Altair's
 public help for /RWALL, /RBODY, /INIVEL and /INIV, and runs computed with OpenRadioss.
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import RadiossRun
 
-_PENALTY_SINCE: Final = 2026  # First input version with Iform in a rigid wall.
+_PENALTY_SINCE: Final = 2026  # First input version in which a rigid wall has Iform.
 _GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
-# Words that may precede the geometry in the keyword of a rigid wall.
+# Words that may precede the geometry in a rigid-wall keyword.
 _WITH_KIND: Final = {"LAGMUL", "THERM"}
 
 
@@ -54,7 +54,7 @@ class NodeGroups:
         return self._found[group]
 
     def _members(self, group: int) -> frozenset[int] | None:
-        """Compute the node ids of a group."""
+        """Find the node ids of a group."""
         nodes_and_parts = self._starter.group_members(group)
         if nodes_and_parts is None or any(
             part not in self.by_part for part in nodes_and_parts[1]
@@ -66,7 +66,7 @@ class NodeGroups:
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
-        """Return the node ids, keyed by part id; parts with particles are omitted, because particles are not read."""
+        """Return the node ids, keyed by part id; parts with particles are left out, because particles are not read."""
         nodes_by_part: dict[int, list[Integers]] = {
             part: [np.empty(0, np.int64)] for part in self._starter.parts
         }
@@ -137,7 +137,7 @@ def _make_unknown(group: int, whose: str, field: CardField) -> Flaw:
 
 
 def _name_bodies(bodies: Sequence[Body]) -> str:
-    """Return the names of some bodies for a message."""
+    """Return the names of some bodies, joined for a message."""
     return f"/RBODY {', '.join(format_ranges(body.id for body in bodies))}"
 
 
@@ -146,7 +146,7 @@ def _get_body_nodes(body: Body, groups: NodeGroups) -> frozenset[int]:
     return groups.members(body.group) or frozenset()
 
 
-# The functions below examine rigid walls.
+# The functions below check rigid walls.
 
 
 def _check_wall(
@@ -195,7 +195,7 @@ def _check_wall(
 def _find_nodes_near_wall(
     card: Card, node: int, starter: Starter, groups: NodeGroups
 ) -> frozenset[int] | None:
-    """Return the nodes within the distance of a wall, on its front side; None if they are unknown."""
+    """Return the nodes within a given distance in front of a wall; None if they are unknown."""
     rows = card.rows[1:]
     reach, _, diameter = read_reals(rows[1], WALL_SIZES)
     if reach == 0:
@@ -210,7 +210,7 @@ def _find_nodes_near_wall(
         if not (ids == node).any():
             return None
         points[0] = coordinates[ids == node][0]
-    # Fields that are not numbers give NaN, which must not cause numpy warnings.
+    # Non-numeric fields give NaN, which must not cause numpy warnings.
     with np.errstate(invalid="ignore", over="ignore"):
         distance = _compute_distance(kind, coordinates, points, diameter / 2)
     if distance is None:
@@ -223,7 +223,7 @@ def _find_nodes_near_wall(
 def _compute_distance(
     kind: str, coordinates: Reals, points: Reals, radius: float
 ) -> Reals | None:
-    """Return the distance of nodes (n, 3) from the front of a wall [length]; None if the geometry is incomplete."""
+    """Return the distances of nodes (n, 3) from the front of a wall [length]; None if the geometry is incomplete."""
     offsets = coordinates - points[0]
     if kind == "SPHER":
         return np.asarray(np.linalg.norm(offsets, axis=1) - radius)
@@ -243,13 +243,13 @@ def _compute_distance(
     )
 
 
-# The functions below examine initial velocities.
+# The functions below check initial velocities.
 
 
 def _check_velocities(
     run: RadiossRun, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield the flaws of bodies whose nodes have an initial velocity while their main node is in no /INIVEL.
+    """Yield a flaw for bodies whose nodes have an initial velocity although their main node is not in any /INIVEL.
 
     The starter gives all nodes of a body the velocity of its main node, even if the first engine run deactivates the
     body.
@@ -288,7 +288,7 @@ def _check_velocities(
 
 
 def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
-    """Return the node group of an /INIVEL, or the nodes that it lists; both are empty if nothing moves at the start."""
+    """Return the node group of an /INIVEL or the nodes that it lists; both are empty if it sets nothing in motion."""
     kind = "".join(card.name.split("/")[1:2])
     rows = card.rows[1:]
     if kind == "NODE":
@@ -316,7 +316,7 @@ def _read_moved_nodes(card: Card) -> tuple[int, frozenset[int]]:
 def _check_starts(
     run: RadiossRun, groups: NodeGroups, bodies: Sequence[Body]
 ) -> Iterator[Flaw]:
-    """Yield the flaws of bodies active in an engine run whose /INIV moves their nodes but not their main node."""
+    """Yield a flaw for bodies active in an engine run whose /INIV moves their nodes but not their main node."""
     on = {body.node.value for body in bodies if not body.sensor}
     for leg in run.legs:
         for _, rigid, nodes in leg.switched:

@@ -82,7 +82,7 @@ _ELASTIC: Final = {
 }
 _VOID: Final = {"VOID", "LAW0", "LAW00"}
 _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
-# Types of shell properties that have the thickness in the same columns.
+# Shell property types that all have the thickness in the same columns.
 _PLAIN_SHELLS: Final = {
     "SHELL",
     "TYPE1",
@@ -125,7 +125,7 @@ _OTHER_SPRINGS: Final = {
 _OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
 _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 
-# Further keywords that connect parts; d2rpick does not read which parts they connect.
+# Other keywords that connect parts; d2rpick does not read which parts they connect.
 _OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
 _AXES: Final = "XYZ"
@@ -142,7 +142,7 @@ class _Property(NamedTuple):
 
 
 def read_radioss_inventory(run: RadiossRun) -> Inventory:
-    """Return the parts and elements of a run; if there is no starter deck, return only a note."""
+    """Return the parts and elements of a run; without a starter deck, return only a note."""
     starter = run.starter
     if starter is None:
         return Inventory(
@@ -162,7 +162,7 @@ def read_radioss_inventory(run: RadiossRun) -> Inventory:
     notes = (*_collect_notes(run, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _find_joints(run, starter)
-    # If there is no engine file, all bodies may be switched.
+    # Without an engine file, all bodies may be switched.
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}
     rigid = _find_always_rigid(windows) | find_parts_of_fixed_bodies(run)
     local_nodes = _find_watched_nodes(starter, local=True)
@@ -264,7 +264,7 @@ def _collect_parts(
 def _choose_material(
     written: Material | None, prop: _Property | None, rigid: bool
 ) -> Material | None:
-    """Return the material of a part. A spring has its stiffness in the property; a rigid body has a rigid material."""
+    """Return the material of a part. A spring has its stiffness in its property; a rigid body has a rigid material."""
     if prop and prop.type in _OF_SPRINGS:
         return Material(f"PROP/{prop.type}", "spring")
     if written and rigid:
@@ -273,7 +273,7 @@ def _choose_material(
 
 
 def _find_always_rigid(windows: Sequence[SwitchWindow]) -> set[int]:
-    """Return the parts that are rigid from the start to the end of the run; empty if there is no engine file."""
+    """Return the parts that are rigid from start to end of the run; empty if there is no engine file."""
     return {
         window.unit.id
         for window in windows
@@ -311,7 +311,7 @@ def _collect_materials(starter: Starter) -> Iterator[tuple[int, Material]]:
 
 
 def _collect_properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
-    """Yield the id and the property of each /PROP, completed by the defaults of /DEF_SHELL and /DEF_SOLID."""
+    """Yield the id and property of each /PROP, with missing values from /DEF_SHELL and /DEF_SOLID."""
     defaults = {
         card.words[0]: _read_flags(card, card.lines)
         for card in starter.named("DEF_SHELL", "DEF_SOLID")
@@ -366,7 +366,7 @@ def _complete_section(
 
 
 def _read_spring_section(rows: Sequence[str]) -> Section:
-    """Read mass and stiffness of a spring; the stiffness is unknown if a function defines it."""
+    """Read the mass and stiffness of a spring; the stiffness is unknown if a function defines it."""
     linear = len(rows) < 3 or not SPRING_FUNCTION["fct_ID1"].cut(rows[2]).strip(" 0")
     return Section(
         damped=_read_positive(rows, 1, SPRING["C"]) is not None,
@@ -376,7 +376,7 @@ def _read_spring_section(rows: Sequence[str]) -> Section:
 
 
 def _read_shell_section(rows: Sequence[str]) -> Section:
-    """Read thickness and integration points of a shell; 0 means global integration, which is treated as 1 point."""
+    """Read the thickness and integration points of a shell; 0 means global integration, which is treated as 1 point."""
     points = SHELL_SECTION["N"].cut(rows[2]).strip() if len(rows) > 2 else None
     if points is None:
         layers = None
@@ -388,7 +388,7 @@ def _read_shell_section(rows: Sequence[str]) -> Section:
 
 
 def _read_flags(card: Card, rows: Sequence[Row]) -> list[int]:
-    """Return the flags in the first line; 0 for a string that is not a flag."""
+    """Return the flags on the first line; 0 for text that is not a flag."""
     return [
         card.integer(rows[0], column).value if rows else 0 for column in SOLID_FLAGS
     ]
@@ -401,7 +401,7 @@ def _read_positive(rows: Sequence[str], row: int, column: CardColumn) -> float |
 
 
 def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
-    """Return supports, prescribed motion and gravity of a starter deck."""
+    """Return the supports, prescribed motions and gravity in a starter deck."""
     if starter.moved and starter.named("GRAV", "BCS", *_MOTIONS):
         return model.Boundary(
             notes=(
@@ -420,7 +420,7 @@ def _collect_boundary(run: RadiossRun, starter: Starter) -> model.Boundary:
 
 
 def _name_card(card: Card) -> str:
-    """Return the keyword of a card with its file and line, for use in messages."""
+    """Return the keyword, file and line of a card for messages."""
     return f"/{card.name} ({card.at})"
 
 
@@ -468,7 +468,7 @@ def _find_holds(run: RadiossRun, starter: Starter) -> Iterator[model.Hold | str]
 
 
 def _find_support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
-    """Read a /BCS card. In local axes, it is always treated as a support, unless it fixes all translations."""
+    """Read a /BCS card. In local axes, it always counts as a support, unless it fixes all translations."""
     moves, turns = (SUPPORT[name].cut(rows[0].text) for name in ("Tra", "Rot"))
     axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
     if not axes and "1" not in turns:
@@ -500,7 +500,7 @@ def _find_motion(card: Card, rows: Sequence[Row]) -> model.Hold:
 def _find_body_holds(
     run: RadiossRun, starter: Starter, holds: Sequence[model.Hold]
 ) -> Iterator[model.Hold]:
-    """Yield a support of all nodes of an active rigid body for each support of its main node."""
+    """Yield a support of all nodes of an active rigid body for each support of the body's main node."""
     for body in starter.bodies:
         if body.sensor or body.node.value in run.named:
             members = None
@@ -542,7 +542,7 @@ def _find_gravity(starter: Starter) -> Iterator[model.Gravity | str]:
 def _read_gravity_card(
     card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]
 ) -> model.Gravity | None:
-    """Read values and nodes of a /GRAV card; None if they are unknown. Gravity is 0 until its sensor is active."""
+    """Read the values and nodes of a /GRAV card; None if they are unknown. Gravity is 0 until its sensor is active."""
     row = get_lines_below_title(card)[0]
     function, skew, sensor, group = (
         card.integer(row, GRAVITY[name]).value
@@ -572,7 +572,7 @@ def _read_gravity_card(
 
 
 def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield the id and the ordinates of each function; a function that the deck scales has no known ordinates."""
+    """Yield the id and ordinates of each function; a function that the deck scales has no known ordinates."""
     moved = {get_number(card) for card in starter.named("MOVE_FUNCT") if card.words[1:]}
     for card in starter.named("FUNCT"):
         number = get_number(card)
@@ -587,7 +587,7 @@ def _read_functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]
         )
 
 
-# Joints connect parts that share no nodes: ties, and rigid bodies that are always active.
+# Joints connect parts that do not share nodes; they are ties, and rigid bodies that are always active.
 # Joints must be inactive while a part is rigid, because a node cannot belong to two rigid bodies.
 # The source of the rule on joints is Altair's help on incompatible kinematic conditions.
 

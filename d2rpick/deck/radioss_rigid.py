@@ -1,4 +1,4 @@
-"""Build the rigid bodies as the Radioss starter does: each with a main node, and merged according to /MERGE/RBODY.
+"""Build rigid bodies as the Radioss starter does: each has a main node, and /MERGE/RBODY merges them.
 
 Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
 computed with it.  Bodies of parts were not computed, as the function that makes them is in no program at hand: their
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
 
-    # Kind of the members of a node group, and the ids of the members.
+    # Kind of the members of a node group, and their ids.
     Group = tuple[str, tuple[int, ...]]
 
-# Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, the body of a part with Irigid.
+# Kinds of ids in /MERGE/RBODY: a rigid body, a node, a node group, or the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
 # First id of the node groups that d2rpick adds; it is larger than any id of a deck.
 MADE_HERE: Final = 10**10
 
 
 class Body(NamedTuple):
-    """A rigid body: its id, main node, sensor and node group; an id is 0 if there is no such object.
+    """A rigid body: its id, main node, sensor and node group; an id of 0 means that there is none.
 
     ``stays``: the starter keeps its nodes in rigid walls (Ikrem 1, or a sensor). ``part`` is the part from which the
     starter makes the body (Irigid); such a body has no id in the deck.
@@ -43,7 +43,7 @@ class Body(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the name of the body for use in messages."""
+        """Return the name of the body for messages."""
         return f"/RBODY {self.id}" if self.id else f"the rigid body of part {self.part}"
 
 
@@ -57,7 +57,7 @@ class Merge(NamedTuple):
 
 
 class RigidBodies(NamedTuple):
-    """Rigid bodies in the form that the engine uses, keyed by main node.
+    """Rigid bodies as the engine uses them, keyed by main node.
 
     ``joined_to`` maps the main node of each merged body, which the engine does not know, to the body that contains it.
     ``groups`` are the node groups that contain merged bodies.
@@ -71,7 +71,7 @@ class RigidBodies(NamedTuple):
 def make_rigid_bodies(
     in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]
 ) -> RigidBodies:
-    """Return the rigid bodies of a deck in the form that the engine uses.
+    """Return the rigid bodies of a deck as the engine uses them.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def make_rigid_bodies(
 def _add_main_nodes(
     in_deck: Sequence[Body], last_node: Callable[[], int]
 ) -> Iterator[Body]:
-    """Yield the bodies with their main nodes, some of which the starter adds.
+    """Yield the bodies with their main nodes, some of which the starter creates.
 
     The added nodes are numbered above all nodes, in the order of the body ids.  The bodies of parts come last, in the
     order of the parts in the deck, as their ids are above all others.
@@ -151,7 +151,7 @@ def _add_main_nodes(
 
 
 def _join_groups(members: Sequence[Group], groups: dict[int, Group]) -> int:
-    """Return the id of a node group that contains all members; a new group is added to ``groups``."""
+    """Return the id of a node group that contains all members; if there is none, add a group to ``groups``."""
     if not members:
         return 0
     if len(members) == 1 and members[0][0] == "GRNOD":

@@ -1,4 +1,4 @@
-"""Read a Radioss run: when its engine runs or time sensors make each part rigid, and which parts stay rigid.
+"""Read when the engine runs or time sensors of a Radioss run make each part rigid, and which parts stay rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and keep their state
 in later runs unless an engine file changes it.
@@ -53,13 +53,13 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_sensors import Forces, Spans
 
     Contacts = Callable[[Collection[int]], Spans | None]
-# Number of lines of /BEGIN: the name of the run, the version, and two lines of units.
+# Number of lines in /BEGIN: the run name, the version, and two lines of units.
 _LINES_OF_BEGIN: Final = 4
 
 
 @dataclass(eq=False, repr=False)
 class RadiossRun:
-    """A Radioss run: its starter deck (if found), and its engine runs in the order of their numbers.
+    """A Radioss run: its starter deck (if there is one), and its engine runs in order of their numbers.
 
     ``deck`` lists its files.
     """
@@ -72,7 +72,7 @@ class RadiossRun:
 
     @cached_property
     def named(self) -> frozenset[int]:
-        """Return the main nodes of the bodies that the engine runs switch."""
+        """Return the main nodes of the bodies switched by the engine runs."""
         main_nodes: set[int] = set()
         for leg in self.legs:
             for _, _, nodes in leg.switched:
@@ -92,7 +92,7 @@ class RadiossRun:
 
     @property
     def pushed(self) -> bool:
-        """Return True if rigid walls or initial velocities may act on the bodies of the run."""
+        """Return True if the run has rigid walls or initial velocities that may affect its bodies."""
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(
             leg.starts for leg in self.legs
         )
@@ -158,7 +158,7 @@ def _read_starter(source: SourceFile, run: RadiossRun, chain: tuple[str, ...]) -
 def _read_include(
     card: Card, source: SourceFile, run: RadiossRun, chain: tuple[str, ...]
 ) -> None:
-    """Add the file that an #include names, or record why it was not read."""
+    """Add the file that an #include names, or record why the file was not read."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     words = card.block.head.split(maxsplit=1)[1:]
@@ -190,7 +190,7 @@ class LegSwitch(SwitchSet):
 
     @property
     def time_field(self) -> CardField:
-        """Return the field with the end of the previous engine run, or the keyword for the first engine run."""
+        """Return the field with the end of the previous engine run; for the first engine run, return the keyword."""
         return self.stop_field or self.card.here
 
 
@@ -236,7 +236,7 @@ def find_run_windows(
     bodies = {body.node.value: body for body in starter.bodies} if starter else {}
     lines = [line.part for leg_switch in sets for line in leg_switch.switched]
     switched = {part.value for part in lines if part.value and not part.problem}
-    # Bodies with a sensor ignore /RBODY/ON and /RBODY/OFF.
+    # Bodies with a sensor are unaffected by /RBODY/ON and /RBODY/OFF.
     sensors = {node for node, body in bodies.items() if body.sensor}
     groups = {
         node: bodies[node].group for node in (*switched, *sensors) if node in bodies
@@ -267,7 +267,7 @@ def find_run_windows(
 
 
 def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
-    """Yield the cards of all engine runs that switch bodies, with their times."""
+    """Yield the cards that switch bodies in all engine runs, with their times."""
     previous: RadiossLeg | None = None
     for leg in legs:
         if previous:
@@ -283,7 +283,7 @@ def _list_switches(legs: list[RadiossLeg]) -> Iterator[LegSwitch]:
 
 
 def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
-    """Return what a body switches: its parts, or the body itself if its parts are unknown."""
+    """Return the units that a body switches: its parts, or the body itself if its parts are unknown."""
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [
         Unit(node, is_body=True)
     ]
@@ -292,7 +292,7 @@ def _list_units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
 def _follow_body(
     unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: RadiossLeg
 ) -> list[SwitchWindow]:
-    """Return the windows of a part of a body, which is rigid from the start unless it is deactivated then."""
+    """Return the windows of a part of a body, which is rigid from the start unless it is deactivated at time 0."""
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [
         (
@@ -340,7 +340,7 @@ def find_course(
 def _follow_sensor(
     run: RadiossRun, body: Body, parts: dict[int, set[int]], course: Course
 ) -> Iterator[SwitchWindow]:
-    """Yield the windows of a body with a sensor; the body is rigid while the sensor is inactive."""
+    """Yield the windows of a body with a sensor; such a body is rigid while its sensor is inactive."""
     active = find_active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
@@ -371,7 +371,7 @@ def _follow_sensor(
 
 
 def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
-    """Return the window of a part that the starter makes rigid (Irigid) and that nothing switches."""
+    """Return the window of a part that the starter makes rigid (Irigid) and nothing switches."""
     unit = Unit(body.part)
     by = LegSwitch(body.card, "plain", None, (), ())
     return SwitchWindow(
@@ -382,7 +382,7 @@ def _make_window_of_rigid_part(body: Body) -> SwitchWindow:
 def find_rigid_parts(
     starter: Starter, bodies: Mapping[int, int]
 ) -> dict[int, set[int]]:
-    """Return the parts that the group of a body names, or whose nodes all belong to the group, keyed by body.
+    """Return the parts that the group of a body names or whose nodes all belong to this group, keyed by body.
 
     Parameters
     ----------
@@ -403,7 +403,7 @@ def find_rigid_parts(
         for node in bodies
     }
     all_parts = starter.parts.keys()
-    # Another part, such as a skin, may use nodes of the named parts.
+    # Other parts, such as a skin, may use only nodes of the named parts.
     incomplete = {
         node: found for node, found in known_members.items() if all_parts - found[1]
     }
@@ -417,7 +417,7 @@ def find_rigid_parts(
 
 
 def find_time_units(run: RadiossRun) -> tuple[str, str]:
-    """Return the time units that /BEGIN names for the starter deck and for the computation; empty if there are none."""
+    """Return the time units that /BEGIN gives for the starter deck and the computation; empty if there are none."""
     cards = run.starter.named("BEGIN") if run.starter else ()
     rows = next((card.rows for card in cards), ())
     if len(rows) < _LINES_OF_BEGIN:
@@ -478,7 +478,7 @@ def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
 
 
 class LeftRigid(NamedTuple):
-    """Parts that stay rigid in a run that switches others, with the line to change, the problem and the cure."""
+    """Parts that stay rigid in a run that switches other parts, with the line to change, the problem and the remedy."""
 
     parts: tuple[int, ...]
     place: CardField
@@ -489,7 +489,7 @@ class LeftRigid(NamedTuple):
 def find_left_rigid(
     run: RadiossRun, windows: Sequence[SwitchWindow]
 ) -> LeftRigid | None:
-    """Return the bodies with complete parts that no engine run names, in a run with rigid ``windows``.
+    """Return the bodies with complete parts that no engine run names although the run has rigid ``windows``.
 
     None if there are none.
     """
@@ -530,7 +530,7 @@ def find_left_rigid(
 
 
 def _list_body_names(bodies: Sequence[Body]) -> str:
-    """Return the names of bodies, which contain their ids, or the part id of a rigid part."""
+    """Return the names of bodies, including their ids, or the part id of a rigid part."""
     ids = [body.id for body in bodies if body.id]
     parts = sorted(body.part for body in bodies if body.part)
     names = [f"/RBODY {', '.join(format_ranges(ids))}"] * bool(ids)

@@ -27,22 +27,22 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Row
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
-    # A function that returns the time spans in which the force of an interface or rigid wall acts, or None.
+    # A function that returns the time spans in which the force of an interface or rigid wall acts; None if unknown.
     Forces = Callable[[str, int], Spans | None]
 
-# First input version in which a time sensor has an end (Tstop).
+# First input version in which a time sensor can end (Tstop).
 STOPS_SINCE: Final = 2023
-NEVER: Final = 1e20  # Smallest time that is treated as never reached.
-# Kinds of force sensors, each with the name of its force in histories.
+NEVER: Final = 1e20  # Times from this value on are treated as never reached.
+# Kinds of force sensors, each with the name of the corresponding force in histories.
 _OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
-# Types of /INTER that exert no contact force on a flying body, such as ties.
+# Types of /INTER that exert no contact force on a flying body, for example ties.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
-# Relative rounding error of the times in a T01 file, which have seven digits [-].
+# Relative rounding error of times in a T01 file [-], which have seven digits.
 _SINGLE: Final = 1e-6
 
 
 class Course(NamedTuple):
-    """Data of a run that determine when sensors are active: its end, its restarts, and the times of forces.
+    """Data that determine when the sensors of a run are active: its end, its restarts, and the times of forces.
 
     The time of the first reset of each sensor, and the spans in which contact forces act [time].
 
@@ -69,7 +69,7 @@ def find_active_spans(
     course: Course = _UNKNOWN,
     above: tuple[int, ...] = (),
 ) -> Spans | str:
-    """Return the time spans in which a sensor is active, in order, or a string that states what is unknown.
+    """Return the ordered time spans in which a sensor is active, or text that says what is unknown.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
     its Tstop is lost.
@@ -121,7 +121,7 @@ def find_active_spans(
 def _find_forced_spans(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
-    """Find when a force sensor is active: from the force (or Tmin later) until Tdelay after the force."""
+    """Find when a force sensor is active: from the start of a contact force, plus Tmin, until Tdelay after its end."""
     keyword = starter.sensors[number].words[1]
     name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
     if len(rows) < 2:
@@ -152,7 +152,7 @@ def _find_forced_spans(
 def find_contacts_of_sensor(
     starter: Starter, number: int, course: Course
 ) -> Spans | None:
-    """Return the time spans of the forces for which a sensor, or one of its inputs, waits [time].
+    """Return the time spans of the forces for which a sensor, directly or through its inputs, waits [time].
 
     None if it waits for none, or if no history shows it.
     """
@@ -173,7 +173,7 @@ def find_contacts_of_sensor(
 
 
 def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
-    """Return the sensors that are the inputs of a sensor."""
+    """Return the sensors that serve as inputs of a sensor."""
     card = starter.sensors.get(number)
     rows = (
         get_lines_below_title(card)
@@ -186,12 +186,12 @@ def _list_inputs(starter: Starter, number: int) -> Sequence[int]:
 
 
 def has_only_one_force(starter: Starter) -> bool:
-    """Return True if a deck has only one contact or rigid wall. Its force can then be found from the momenta."""
+    """Return True if a deck has only one contact or rigid wall, whose force then follows from the momenta."""
     return len(list_forces(starter)) == 1
 
 
 def list_forces(starter: Starter) -> list[tuple[str, int]]:
-    """Return sensor kind and id of each contact and rigid wall that exerts a force on a flying body."""
+    """Return the sensor kind and id of each contact and rigid wall that exerts a force on a flying body."""
     # The keyword is /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id.
     contacts = [
         ("INTER", get_number(card, 2) or get_number(card, 3))

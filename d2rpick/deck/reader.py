@@ -1,4 +1,4 @@
-"""Read an LS-DYNA keyword deck with its includes: the cards that matter for switching, in reading order."""
+"""Read those cards of an LS-DYNA deck and its includes that matter for switching, in reading order."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ _KEPT: Final = (
     *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-# The paths on both cards are relative to the folder of the main deck.
+# Paths on both cards are relative to the folder of the main deck.
 _PATHS: Final = (
     "INCLUDE_PATH",
     "INCLUDE_PATH_RELATIVE",
 )
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled at its first use, to keep start-up fast.
-# Pattern of keywords that resemble those of switching cards.
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # This pattern is compiled on first use to keep start-up fast.
+# Pattern of keywords that resemble switching keywords.
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # Largest depth of nested includes.
@@ -84,7 +84,7 @@ _MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
     r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
-# Engine keywords that need values; a file that ends with such a keyword line is truncated.
+# Engine keywords that require values; a file that ends with one of these keyword lines is truncated.
 _WITH_VALUES: Final = (
     "RUN",
     "RBODY",
@@ -110,7 +110,7 @@ class Unread(NamedTuple):
 
 
 class Restart(NamedTuple):
-    """The start of a restart [time of the run], and the field that contains this time."""
+    """The start time of a restart [time of the run], and the field that contains it."""
 
     at: float
     stop_field: CardField
@@ -119,7 +119,7 @@ class Restart(NamedTuple):
 def _read_include_card(
     card: Card,
 ) -> Iterator[tuple[CardField, Transform, tuple[Problem, ...]]]:
-    """Yield, for each file on an ``*INCLUDE`` card, its name, its transform and the transform's unreadable fields.
+    """Yield, for each file on an ``*INCLUDE`` card, its name, its transform and the fields that could not be read.
 
     ``*INCLUDE`` has one name per line, ``*INCLUDE_TRANSFORM`` one name and then numbers.
     """
@@ -133,7 +133,7 @@ def _read_include_card(
 
 
 def _read_file_names(card: Card) -> Iterator[tuple[CardField, list[Row]]]:
-    """Yield each file name on a card, and the rows after it.
+    """Yield each file name on a card with the rows after it.
 
     A name that ends with blank and plus continues on the next line; parameters in it are replaced.
     """
@@ -154,7 +154,7 @@ def _read_file_names(card: Card) -> Iterator[tuple[CardField, list[Row]]]:
 def _read_transform(
     card: Card, rows: list[Row]
 ) -> tuple[Transform, tuple[Problem, ...]]:
-    """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank or a factor of 0 means no change."""
+    """Read the numbers of ``*INCLUDE_TRANSFORM``; a missing row, a blank field or a factor of 0 means no change."""
     id_columns = [
         *((0, ID_OFFSETS[f"ID{letter}OFF"]) for letter in "NPMS"),
         (1, OTHER_OFFSET["IDROFF"]),
@@ -183,7 +183,7 @@ def _read_transform(
     transform_id = (
         card.integer(rows[3], TRANSFORMATION["TRANID"]) if len(rows) > 3 else None
     )
-    # A transformation that cannot be read may move nodes.
+    # An unreadable transform may move nodes.
     moved = transform_id is not None and (
         bool(transform_id.problem) or transform_id.value != 0
     )
@@ -200,13 +200,13 @@ def _get_folder(file: str) -> Path:
 
 
 def _make_portable(name: str) -> str:
-    """Return a file name with forward slashes."""
+    """Return a file name with forward slashes as separators."""
     return name.replace("\\", "/")
 
 
 @dataclass(eq=False, repr=False)
 class Deck:
-    """A deck after reading: the relevant ``cards``, the ``disabled`` cards (*COMMENT), encrypted blocks and includes.
+    """A deck as read: the relevant ``cards``, the ``disabled`` cards (*COMMENT), encrypted blocks and includes.
 
     ``problems`` are unreadable numbers of includes. ``ends`` are the last blocks of files without *END, and True for
     the main file. ``restarts`` are the restarts that continue its run.
@@ -222,7 +222,7 @@ class Deck:
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
-    # True if the main file is in long format at its end.
+    # True if the main file is in long format where it ends.
     long: bool = False
     # Restarts of the run, keyed by file name.
     restarts: dict[str, Restart] = field(default_factory=dict)
@@ -233,7 +233,7 @@ class Deck:
         return [source.name for source in self.sources]
 
     def named(self, *names: str) -> list[Card]:
-        """Return the cards whose keyword is one of ``names``, or one of these followed by ``_`` and an option."""
+        """Return the cards whose keyword is one of ``names``, or one of them followed by ``_`` and an option."""
         by_name = [self._by_name[name] for name in names if name in self._by_name]
         if len(by_name) < 2:
             return [*by_name[0]] if by_name else []
@@ -242,7 +242,7 @@ class Deck:
 
     @cached_property
     def _by_name(self) -> Mapping[str, Sequence[Card]]:
-        """Return the cards, keyed by name and by each prefix of the name before an ``_``; rules request both."""
+        """Return the cards, keyed by name and by each prefix of the name before a ``_``; rules use both as keys."""
         cards_by_name: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
             for name in _list_stems(card.name):
@@ -260,7 +260,7 @@ class Deck:
 
     @property
     def silencing(self) -> list[Card]:
-        """Return the cards that follow a comment that silences rules."""
+        """Return the cards that are preceded by a comment that silences rules."""
         return [
             card
             for card in self._all
@@ -274,7 +274,7 @@ class Deck:
 
     @cached_property
     def _by_line(self) -> defaultdict[str, list[Card]]:
-        """Return the cards of each file in the order of lines, keyed by file name."""
+        """Return the cards of each file in line order, keyed by file name."""
         cards_by_file: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self._all:
             cards_by_file[card.file].append(card)
@@ -285,14 +285,14 @@ class Deck:
 
 @lru_cache(1024)  # Results are cached, because decks use the same keywords repeatedly.
 def _list_stems(name: str) -> tuple[str, ...]:
-    """Return a name and each of its prefixes that end before an ``_``."""
+    """Return a name and each of its prefixes that end before a ``_``."""
     return tuple(
         name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_")
     )
 
 
 def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
-    """Return the cards of a deck and of all its includes.
+    """Return the cards of a deck and all its includes.
 
     Parameters
     ----------
@@ -329,7 +329,7 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
 
 
 class _Context(NamedTuple):
-    """Data that an included file inherits from the including file."""
+    """Data that an included file inherits from the file that includes it."""
 
     scope: Scope
     width: int = STANDARD
@@ -338,7 +338,7 @@ class _Context(NamedTuple):
 
 
 class _Reader:
-    """Reads the files of a deck into `Deck`."""
+    """Reads the files of a deck into a `Deck`."""
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
@@ -387,7 +387,7 @@ class _Reader:
             )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
-        """Store a card, or follow its instruction to the reader."""
+        """Store a card, or act on it if it is an instruction to the reader."""
         if card.name.startswith("COMMENT"):
             if re.search(
                 r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",
@@ -409,7 +409,7 @@ class _Reader:
             self.deck.cards.append(card)
 
     def include(self, card: Card, context: _Context, width: int) -> None:
-        """Read the files of an include card, or record why they are not read."""
+        """Read the files on an include card, or record why they are not read."""
         if card.name not in _READ_INCLUDES:
             self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
@@ -428,7 +428,7 @@ class _Reader:
                 )
 
     def find(self, name: CardField) -> str | None:
-        """Return the path of an include file in the form used in messages; None if no such file exists.
+        """Return the path of an include file as it appears in messages; None if there is no such file.
 
         Programs that read decks disagree whether the folder of the main deck, *INCLUDE_PATH or the folder of the
         including file comes first. All are tried in this order, and the first file found is used.
@@ -438,7 +438,7 @@ class _Reader:
             *self.folders,
             _get_folder(name.file),
         ):
-            # The last spelling decodes the bytes as the file system does, instead of as Latin-1.
+            # The last variant decodes the bytes as the file system does, rather than as Latin-1.
             for spelling in (
                 name.text,
                 _make_portable(name.text),
@@ -465,7 +465,7 @@ def explain_unread(path: str | None, chain: Sequence[str]) -> str:
 
 
 def _parse_keyword(head: str) -> tuple[str, str]:
-    """Return the keyword in upper case without format suffixes, and these suffixes.
+    """Return the keyword in upper case without its format suffixes, and these suffixes.
 
     Examples
     --------
@@ -501,7 +501,7 @@ def find_cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
 
 
 def describe_cure(block: Block) -> str:
-    """Return what to do about a truncated file that ends with this block."""
+    """Return the remedy for a truncated file that ends with this block."""
     if not block.source.ends_with_line():
         return "use the complete file, or end its last line"
     end_mark = "/END" if block.head.startswith("/") else "*END"

@@ -1,4 +1,4 @@
-"""Join small restart decks of LS-DYNA to a run; their cards switch at the end of the previous run.
+"""Join small restart decks of LS-DYNA to a run; the cards of a restart switch when the previous run ends.
 
 A small restart has no parts. Its *RIGID_DEFORMABLE cards have no time: they act when the restart begins, at the ENDTIM
 of the run before. Source: the vendor's keyword data as published in its Python library.
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Value
 
 _KEYWORD: Final = "RIGID_DEFORMABLE"
-# Size of the largest file that may be a small restart [bytes].
+# Largest file that may be a small restart [bytes].
 _LARGEST: Final = 1 << 20
 
 
@@ -35,12 +35,12 @@ def is_restart(path: str) -> bool:
                 return False
         deck = read_deck(path)
     except (DeckError, OSError):
-        return False  # The error is reported by the check of the deck.
+        return False  # The deck check reports the error.
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
 def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
-    """Return a run and its restarts as one deck, in which each card of a restart has a time.
+    """Return a run and its restarts as one deck in which each restart card has a time.
 
     The times stay unknown unless each run has an end later than the one before.
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def write_time_sensor(
     number: int, title: str, start: float, stop: float | None = None
 ) -> str:
-    """Return the card of a sensor that is active from ``start`` on, until ``stop`` if ``stop`` is given [time]."""
+    """Return the card of a sensor that is active from ``start`` on, or only until ``stop`` if it is given [time]."""
     text = f"/SENSOR/TIME/{number}\n{title}\n{DELAY.write(Tdelay=write_number(start, 20))}\n"
     if stop is None:
         return text
@@ -23,21 +23,21 @@ def write_time_sensor(
 
 
 def write_force_sensor(number: int, kind: str, entity: int, wait: float) -> str:
-    """Return the card of a sensor active while a contact or wall exerts a force, and for a further ``wait`` [time]."""
+    """Return the card of a sensor that is active while a contact or wall exerts a force, and ``wait`` longer [time]."""
     delay = DELAY.write(Tdelay=write_number(wait, 20))
     force = FORCE_SENSOR.write(ID=entity, Dir="NF", Fmin=-1.0)
     return f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{delay}\n{force}\n"
 
 
 def _write_sensor_of_sensors(kind: str, number: int, title: str, *inputs: int) -> str:
-    """Return the card of a sensor of kind OR, AND or NOT, with one or two other sensors as inputs."""
+    """Return the card of an OR, AND or NOT sensor whose inputs are one or two other sensors."""
     names = ("sens_ID1", "sens_ID2")[: len(inputs)]
     row = SENSOR_INPUTS.write(**dict(zip(names, inputs, strict=True)))
     return f"/SENSOR/{kind}/{number}\n{title}\n{DELAY.write(Tdelay=0)}\n{row}\n"
 
 
 def write_any_of(numbers: Sequence[int], title: str) -> tuple[str, int]:
-    """Return cards of sensors that combine given sensors by OR, and the id of the last one, which has the result."""
+    """Return the cards of sensors that combine sensors by OR, and the id of the last one, which gives the result."""
     texts: list[str] = []
     last, *others = numbers
     for number, other in enumerate(others, start=numbers[-1] + 1):

@@ -1,4 +1,4 @@
-"""Read a deck file: find its keywords without reading each line of the mesh, and return the lines between them."""
+"""Read a deck file: find its keywords without reading each mesh line, and return the lines between keywords."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import DeckOnDisk
 
 
-# Number of bytes that are searched at once, so that the search buffer fits into the processor's cache.
+# Number of bytes that are searched at a time; they fit into the processor cache.
 _SEARCHED: Final = 3 << 18
-# Number of additional threads; they copy bytes in parallel, but only one thread searches at a time.
+# Number of additional threads; they copy bytes in parallel, but only one thread can search at a time.
 _HELPERS: Final = 1
-# Number of blocks that one thread searches before a second thread is started.
+# Number of blocks that one thread searches before a second thread starts.
 _ALONE: Final = 4
-# Number of bytes before a block that are searched again, because a mark may cross the start of the block.
+# Number of bytes before a block that are searched again, because a mark may extend across the start of the block.
 _LOOKBACK: Final = 32
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-# Offset of a letter of the mark that mesh data never contains, so that the search for this letter is fast.
+# Offset of a letter of the mark that does not occur in mesh data; the search for this letter is therefore fast.
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # Byte order mark of UTF-8.
 
-# Number of bytes in which complete lines are processed at once.
+# Number of bytes whose complete lines are processed at a time.
 _PIECE: Final = 4 << 20
-# Number of sections of a block in which line ends are counted; a section fits into the processor's cache.
+# Number of sections of a block in which line endings are counted; a section fits into the processor cache.
 _COUNTED: Final = 16
 _GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # Number of bytes in which the first line end is expected.
-_HEAD: Final = 1024  # Largest number of bytes of a keyword line that are read.
-# Number of bytes before a keyword in which comments on the keyword are expected.
+_FIRST: Final = 1 << 16  # Number of bytes that should contain a line ending.
+_HEAD: Final = 1024  # Largest number of bytes that are read of a keyword line.
+# Number of bytes before a keyword within which comments on it are expected.
 _BEFORE: Final = 4096
-# This pattern is compiled at its first use, to keep start-up fast.
+# This pattern is compiled on first use to keep start-up fast.
 _SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
 
 
@@ -54,7 +54,7 @@ def find_marks(
     alone: int = _ALONE,
     helpers: int = _HELPERS,
 ) -> Sequence[int]:
-    """Return, in ascending order, the offsets of encrypted blocks and of each ``*`` that begins a line (after blanks).
+    """Return the ascending offsets of encrypted blocks, and of each ``*`` that begins a line, possibly after spaces.
 
     A file of more than ``alone`` pieces of ``piece`` bytes is searched by ``helpers`` additional threads.
     """
@@ -69,7 +69,7 @@ def find_marks(
 
 
 class _Search:
-    """A search of a file by several threads, each of which searches the next block."""
+    """A search of a file by several threads, each of which repeatedly searches the next block."""
 
     def __init__(self, file: HeldInMemory | DeckOnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
@@ -83,7 +83,7 @@ class _Search:
         )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
-        # Locks of the additional threads; each thread releases its lock when it ends.
+        # Locks of the additional threads; each thread releases its lock when it has finished.
         self._helping: list[_thread.LockType] = []
 
     def call_for_help(self) -> None:
@@ -92,12 +92,12 @@ class _Search:
         helping.acquire()
         with suppress(
             RuntimeError
-        ):  # No further thread is available, so this thread searches alone.
+        ):  # No further thread is available, so this thread does the whole search.
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
     def _help(self, helping: _thread.LockType) -> None:
-        """Search in an additional thread; after an error, its blocks are left to `result`."""
+        """Search in an additional thread; after an error, `result` searches the blocks that remain."""
         try:
             with suppress(DeckError, OSError, MemoryError):
                 self.go_on()
@@ -105,7 +105,7 @@ class _Search:
             helping.release()
 
     def go_on(self) -> None:
-        """Search the remaining blocks in one buffer, because new memory costs more than copying into it."""
+        """Search the remaining blocks in one buffer, because new memory costs more than copying into old memory."""
         marks_by_piece: dict[int, Sequence[int]] = {}
         piece = bytearray(_LOOKBACK + min(self._piece, self._file.size))
         with self._file.opened() as fill:
@@ -125,7 +125,7 @@ class _Search:
         self._found |= marks_by_piece
 
     def stop(self) -> None:
-        """Take all remaining blocks from the other threads, and wait until the threads have ended."""
+        """Take all remaining blocks away from the other threads, and wait until these threads have finished."""
         self._waiting = iter(())
         for helping in self._helping:
             helping.acquire()
@@ -162,7 +162,7 @@ def _find_starred(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 def _find_below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
-    """Return the position of the next letter after the line that contains ``at``; -1 if there is no such letter."""
+    """Return the position of the next letter after the line that contains ``at``; -1 if there is none."""
     line = piece.find(b"\n", at, end)
     return piece.find(letter, line, end) if line >= 0 else -1
 
@@ -186,7 +186,7 @@ def _find_encrypted(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 class SourceFile:
-    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of the same snapshot of the file.
+    """One deck file, read as bytes and decoded as Latin-1; all reads return bytes of the same snapshot.
 
     ``name`` is the path for messages. ``content`` is given if the content is not in a file or the file is open already.
     ``piece`` bytes are processed together. Line numbers are counted on request: in a large deck counting takes longer
@@ -210,7 +210,7 @@ class SourceFile:
         elif isinstance(content, bytes):
             content = HeldInMemory(content)
         self._file = content
-        # Ascending offsets at which the line number is known, with these numbers.
+        # Ascending offsets at which the line number is known, and these line numbers.
         self._counted = [(0, 1)]
         self._longest = bound("LINE")
 
@@ -227,7 +227,7 @@ class SourceFile:
         return find_marks(self._file)
 
     def blocks(self) -> Iterator[Block]:
-        """Yield keyword blocks and encrypted blocks in the order of the file, up to ``*END``."""
+        """Yield keyword blocks and encrypted blocks in file order, up to ``*END``."""
         for start, end in zip_longest(self.marks, islice(self.marks, 1, None)):
             head = (
                 self.read(start, start + _HEAD)
@@ -244,7 +244,7 @@ class SourceFile:
         return self._file.read(start, self._file.size if end is None else end)
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
-        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in blocks that end with a line end."""
+        """Yield the bytes from ``start`` to ``end`` (default: end of the file) in blocks that end at a line ending."""
         end = min(self._file.size, self._file.size if end is None else end)
         size = self._piece
         while start < end:
@@ -256,7 +256,7 @@ class SourceFile:
                 yield piece
                 start += len(piece)
             else:
-                size *= 2  # The line is longer than a block.
+                size *= 2  # This line is longer than a block.
 
     def text(self, start: int, end: int | None) -> str:
         """Return the bytes from ``start`` to ``end`` as Latin-1 text."""
@@ -287,12 +287,12 @@ class SourceFile:
         return digest.hexdigest()
 
     def ends_with_line(self) -> bool:
-        """Return True if the last line has a line end, or if the file is empty."""
+        """Return True if the last line has a line ending, or if the file is empty."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
     @cached_property
     def silences(self) -> bool:
-        """Return True if comments may silence rules. A large file is not searched for such comments and gives True."""
+        """Return True if comments may silence rules. A large file is not searched for them, and the result is True."""
         return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
@@ -311,7 +311,7 @@ class SourceFile:
 
 @dataclass(eq=False, repr=False)
 class Block:
-    """A keyword with all lines up to the next keyword, or an encrypted block, as a range of a file."""
+    """A keyword with all lines up to the next keyword, or an encrypted block, as a byte range in a file."""
 
     source: SourceFile
     start: int
@@ -325,7 +325,7 @@ class Block:
 
     @property
     def _comment(self) -> tuple[str, ...]:
-        """Return the characters that begin comment lines: ``$``, and in Radioss files also ``#``."""
+        """Return the characters that begin comment lines: ``$``, plus ``#`` in Radioss files."""
         return ("$", "#") if self.head.startswith("/") else ("$",)
 
     @cached_property
@@ -334,10 +334,10 @@ class Block:
         return self.source.line_at(self.start)
 
     def lines(self) -> list[tuple[int, str]]:
-        """Return the data lines without comments, each with its number of lines from the keyword line."""
+        """Return the data lines without comments, each with its distance from the keyword line in lines."""
         comment = self._comment
         *lines, last = self.source.text(self.start, self.end).split("\n")
-        # If this line were kept, the block would contain the blanks before the next keyword.
+        # If this line were kept, the block would contain the spaces before the next keyword.
         if last and self.end is None:
             lines.append(last)
         numbered = enumerate(lines[1:], start=1)
@@ -349,7 +349,7 @@ class Block:
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:
-        """Return the rule ids, or prefixes of ids, in ``$ d2rpick: ignore`` comments before the keyword.
+        """Return the rule ids, or prefixes of ids, in the ``$ d2rpick: ignore`` comments before the keyword.
 
         Only words directly after the colon are read, so that a reason may follow. A word that is not an id is returned
         too.
@@ -357,7 +357,7 @@ class Block:
         above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
             BYTE_ORDER_MARK
         )
-        # The last element contains only the blanks before the keyword.
+        # The last element contains only the spaces before the keyword.
         lines = above.decode("latin-1").split("\n")[:-1]
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     Filling = Callable[[bytearray, int, int], int]
 
 
-# Size of the largest file that is kept in memory [bytes]; a deck may have thousands of include files.
+# Largest file that is kept in memory [bytes]; a deck may have thousands of include files.
 HELD_UP_TO: Final = 1 << 18
-# Smallest number of bytes read at a time, because the next request is usually for nearby bytes.
+# Smallest number of bytes read at a time; the next request is usually for nearby bytes.
 _WINDOW: Final = 1 << 16
-# Number of cached blocks of a file, because the ends of large blocks are read repeatedly.
+# Number of blocks of a file that are cached, because the ends of large blocks are read repeatedly.
 _KEPT: Final = 8
 
 
@@ -60,7 +60,7 @@ class DeckOnDisk:
     def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
         self._name, self._state, self._window = name, state, window
-        # Blocks of the file, keyed by offset, with the oldest block first.
+        # Blocks of the file, keyed by offset, from oldest to newest.
         self._windows: dict[int, bytes] = {}
 
     def read(self, begin: int, end: int) -> bytes:
@@ -109,7 +109,7 @@ class DeckOnDisk:
 
 
 def open_stored(name: str) -> HeldInMemory | DeckOnDisk:
-    """Return the bytes of a file; they are in memory if the file is small or not a regular file.
+    """Return the bytes of a file; a small file, or anything other than a regular file, is held in memory.
 
     Raises
     ------

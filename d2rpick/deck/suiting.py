@@ -1,4 +1,4 @@
-"""Find what a deck requires of a card: free ids, constraints on the parts, and the name and end of its run."""
+"""Find the requirements of a deck on a card: free ids, constraints on the parts, and the name and end of the run."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from d2rpick.deck.switching import read_switching
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-# First id of new switch sets and part sets, unless the deck uses this id.
+# First id of new switch sets and part sets, unless the deck already uses it.
 _FIRST: Final = 901
 
 
 class Suiting(NamedTuple):
-    """Requirements of a deck for a card; None and False mean that there is no requirement.
+    """Requirements that a deck places on a card; None and False mean that there is no requirement.
 
     ``solver`` is the solver of the deck, ``name`` and ``end`` [time] belong to its run. ``swset`` are free ids of
     switch sets; the ids above them are free for part sets too. ``delete_nodal_bodies`` and ``delete_node_sets``: the
@@ -39,7 +39,7 @@ class Suiting(NamedTuple):
 
 
 def find_suiting(path: str, parts: Collection[int]) -> Suiting:
-    """Return what a deck requires of a card that switches given parts.
+    """Return what a deck requires of a card that switches the given parts.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:
-    """Return the common beginning of the file names of a run, by which the engine finds the restart file.
+    """Return the common beginning of a run's file names, by which the engine finds the restart file.
 
     If the files have no common name, return the name in /RUN.
     """
@@ -87,7 +87,7 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
 def _is_on_parts(
     constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
 ) -> bool:
-    """Return True if there are constraints and all of them belong to these parts alone, so that they may be deleted."""
+    """Return True if there are constraints and all belong to these parts alone, so that they may be deleted."""
     if not constraints:
         return False
     # Imported here to keep start-up fast.

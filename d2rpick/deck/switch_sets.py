@@ -1,4 +1,4 @@
-"""Write a switch set of LS-DYNA (*DEFORMABLE_TO_RIGID_AUTOMATIC): its two header lines and its part lines."""
+"""Write an LS-DYNA switch set (*DEFORMABLE_TO_RIGID_AUTOMATIC): its two header lines and its part lines."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Printing
 
-# Values of NRBF and NCSF that delete and activate the constraints on the parts.
+# Values of NRBF and NCSF that delete the constraints on the parts and activate them again.
 _DELETE, _ACTIVATE = 1, 2
 
 
 def write_rigid_lines(
     ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the D2R lines of given parts or of their part sets, with lead parts first."""
+    """Yield the D2R lines of the given parts or their part sets, with lead parts first."""
     yield TO_RIGID.write_names()
     for lead, members in group_by_lead(ids, printing).items():
         yield from (
@@ -37,7 +37,7 @@ def write_rigid_lines(
 def write_deformable_lines(
     ids: Sequence[int], part_sets: PartSets = NO_SETS
 ) -> Iterator[str]:
-    """Yield the R2D lines of given parts, or the line of their part set."""
+    """Yield the R2D lines of the given parts, or the line of their part set."""
     yield TO_DEFORMABLE.write_names()
     yield from (
         TO_DEFORMABLE.write(PID=name, PTYPE=kind)
@@ -55,7 +55,7 @@ def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]
 
 
 def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
-    """Return the lead part of each part that is merged into another part's rigid body."""
+    """Return the lead part of each part that is merged into the rigid body of another part."""
     if printing.merge is not None:
         return {part: printing.merge for part in ids if part != printing.merge}
     bodies = [[part for part in body if part in ids] for body in printing.bodies]
@@ -85,7 +85,7 @@ def write_header(
     pair: tuple[int, int],
     constraints: Sequence[int] = (0, 0),
 ) -> Iterator[str]:
-    """Yield the header lines of a switch set; TIME1 is ``time``, or the earliest time if the set waits for a force.
+    """Yield the header lines of a switch set; TIME1 is ``time``, or the earliest time for a set that needs a force.
 
     ``pair`` are the id of the other set and PAIRED, used if the set waits.  ``counts`` are D2R and R2D.
     ``constraints`` are NRBF and NCSF: 0 keeps constraints, 1 deletes them, 2 activates
@@ -126,7 +126,7 @@ def write_set_pair(
     part_sets: PartSets = NO_SETS,
     waits: tuple[Waiting, Waiting] = (Waiting(), Waiting()),
 ) -> Iterator[str]:
-    """Yield the lines of a switch set that makes parts rigid, and of one that makes them deformable again.
+    """Yield the lines of a switch set that makes parts rigid and of one that makes them deformable again.
 
     ``sets``, ``times`` and ``waits`` are those of the two sets.  ``step_cap`` holds while the parts are rigid.
     """

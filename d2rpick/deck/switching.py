@@ -1,4 +1,4 @@
-"""Read the LS-DYNA switching cards field by field, and find the rigid windows that the cards of either solver define.
+"""Read LS-DYNA switching cards field by field, and find the rigid windows that the cards of either solver define.
 
 The cards are *DEFORMABLE_TO_RIGID, its variants, and the restart cards *RIGID_DEFORMABLE.
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 
-BY_TIME, BY_SENSOR = 0, 5  # Values of CODE for switches by time and by sensor.
+BY_TIME, BY_SENSOR = 0, 5  # Values of CODE for switches by time and by a sensor.
 _KINDS: Final[dict[str, Kind]] = {
     "DEFORMABLE_TO_RIGID": "plain",
     "DEFORMABLE_TO_RIGID_AUTOMATIC": "automatic",
@@ -55,16 +55,16 @@ _INERTIA_ROWS: Final = (
 
 
 class Switched(NamedTuple):
-    """One part line of a card: a part, or a part set (``by_set``), that becomes rigid or deformable."""
+    """One part line of a card: a part or part set (``by_set``) that becomes rigid or deformable."""
 
     part: Value[int]
     by_set: bool
     to_rigid: bool
-    lead: Value[int] | None = None  # Value of LRB, which occurs only in D2R lines.
+    lead: Value[int] | None = None  # Value of LRB, which only D2R lines contain.
 
 
 class SwitchHeader(NamedTuple):
-    """The two header lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; ``to_rigid`` and ``to_deformable`` are D2R and R2D."""
+    """The two header lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; ``to_rigid`` is D2R and ``to_deformable`` is R2D."""
 
     swset: Value[int]
     code: Value[int]
@@ -85,7 +85,7 @@ class SwitchHeader(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class SwitchSet:
-    """One switching card: its header, if it has one, and its parts.
+    """One switching card: its header (if any) and its parts.
 
     ``count_problem`` says how lines and counts differ, or is empty. ``values`` are all its fields.
     """
@@ -146,7 +146,7 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
 
 
 def find_misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
-    """Yield misspelled switching cards, each with the keyword that was probably intended."""
+    """Yield misspelled switching cards, each with the keyword that was probably meant."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
             # Imported here to keep start-up fast.
@@ -244,7 +244,7 @@ def _read_automatic(card: Card) -> SwitchSet:
 
 
 def _describe_missing(rows: Sequence[Row]) -> str:
-    """Describe which header lines are missing, or replaced by a part line; empty if no header line is missing."""
+    """Describe header lines that are missing or replaced by a part line; empty if none are missing."""
     both_missing = (
         "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
     )
@@ -268,7 +268,7 @@ def _is_part_line(row: Row) -> bool:
 
 
 def _count_lines(count: int) -> str:
-    """Describe how many part lines follow the header lines."""
+    """Describe the number of part lines after the header lines."""
     return "1 part line follows" if count == 1 else f"{count or 'no'} part lines follow"
 
 
@@ -299,7 +299,7 @@ def _read_header(card: Card, first: Row, second: Row) -> SwitchHeader:
 
 
 def _is_overlong(row: Row) -> bool:
-    """Return True if the digits of TIME1 continue in the columns of TIME2, so that TIME2 is not a separate number."""
+    """Return True if the digits of TIME1 run on into the columns of TIME2, so that TIME2 is not a separate number."""
     border = SWITCH_TIMES["TIME2"].position * row.width
     next_field = row.text[border : border + row.width].strip()
     touching = (
@@ -384,7 +384,7 @@ def _make_switch_set(
 
 
 class Unit(NamedTuple):
-    """What a card switches: a part, or a part set or rigid body (given by its main node) whose parts are unknown."""
+    """The target of a switch: a part, or a part set or rigid body (given by its main node) whose parts are unknown."""
 
     id: int
     is_set: bool = False
@@ -404,7 +404,7 @@ class Unit(NamedTuple):
 
 
 class SwitchEvent(NamedTuple):
-    """A switch of one part or other unit, caused by a line of a card."""
+    """A switch of one part or other unit, caused by one line of a card."""
 
     unit: Unit
     by: SwitchSet
@@ -430,7 +430,7 @@ class SwitchWindow(NamedTuple):
 
 
 class Windows(NamedTuple):
-    """All rigid windows of a deck by unit and time; ``orphans`` are switches back of units that were not rigid.
+    """All rigid windows of a deck by unit and time; ``orphans`` are releases of units that were not rigid.
 
     ``other_rigid`` and ``other_deformable`` are units that are switched at unknown times (CODE 1-5, restarts).
     """
@@ -447,7 +447,7 @@ def find_windows(
     parts: DeckParts,
     by_sensor: Iterable[tuple[float, SwitchEvent]] = (),
 ) -> Windows:
-    """Return the windows of every part, from the cards in the order of their times.
+    """Return the windows of every part, from the cards in order of their times.
 
     ``by_sensor`` are switches by sensors with their times, which the cards do not contain.
 
@@ -464,7 +464,7 @@ def find_windows(
     windows: list[SwitchWindow] = []
     orphans: list[SwitchEvent] = []
     for unit in sorted(timed):
-        # At equal times, the switch back comes first, so that there is no window of length 0.
+        # At equal times, the switch to deformable comes first, so that there is no window of length 0.
         unit_windows, unit_orphans = follow_unit(
             unit,
             sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
@@ -483,7 +483,7 @@ def find_windows(
 
 
 def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
-    """Yield the switches that a card causes, one for each part."""
+    """Yield the switches that a card causes, one per part."""
     for line in card.switched:
         if line.part.problem:
             continue
@@ -497,7 +497,7 @@ def _list_events(card: SwitchSet, parts: DeckParts) -> Iterable[SwitchEvent]:
 def follow_unit(
     unit: Unit, events: Iterable[tuple[float, SwitchEvent]]
 ) -> tuple[list[SwitchWindow], list[tuple[float, SwitchEvent]]]:
-    """Return the windows of a part or other unit from its ordered events, and switches back while it is deformable."""
+    """Return the windows of a part or other unit from its ordered switches, and each release while it is deformable."""
     windows: list[SwitchWindow] = []
     orphans: list[tuple[float, SwitchEvent]] = []
     opened: tuple[float, SwitchEvent] | None = None

@@ -1,4 +1,4 @@
-"""Find the parts that must not be switched whatever their energy, with the reasons.
+"""Find the parts that must not be switched whatever their energy, and the reasons.
 
 Material that flows through its mesh is not a body. A law that computes the stress from the deformation since the start
 has that start as its stress-free reference. What the part underwent as a rigid body (a stress that was set to zero, or
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # Formulations of *SECTION_SOLID (ELFORM) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
-# Patterns of the *MAT keywords of material laws with a stress-free reference state, by name and by number.
+# Patterns of the *MAT keywords, by name and number, of material laws with a stress-free reference state.
 _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
@@ -67,7 +67,7 @@ class Unswitchable(NamedTuple):
 def find_unswitchable_in_ls_dyna(
     deck: Deck, parts: DeckParts
 ) -> dict[int, Unswitchable]:
-    """Return the parts of an LS-DYNA deck that must not be switched, keyed by part id, from sections and materials."""
+    """Return the parts of an LS-DYNA deck whose section or material forbids switching, keyed by part id."""
     sections = read_sections(deck)
     laws = {
         name_material(card, card.data[0], MATERIAL["MID"]): card.name

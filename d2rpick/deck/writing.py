@@ -1,4 +1,4 @@
-"""Write a deck with switching cards into another folder, ready to run.
+"""Write a ready-to-run deck with switching cards into another folder.
 
 For a driven Radioss run, engine files are written one engine run at a time.
 """
@@ -55,7 +55,7 @@ _ONCE = {
     "END",
 }
 
-# Engine keywords that are not repeated, because an engine run writes its restart file only at its end.
+# Engine keywords that are not repeated, because an engine run writes its restart file only when it ends.
 _NOT_REPEATED: Final = {"RFILE"}
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "us": 1e6}
 
@@ -137,7 +137,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         raise DeckError(
             f"{main}: an LS-DYNA deck, but the cards are for another solver"
         )
-    # The added lines would hide that the file is truncated, and could complete a truncated number.
+    # The added lines would hide the truncation of the file, and could complete a truncated number.
     for block, sign in find_cuts(deck):
         if block.source is deck.sources[0]:
             raise DeckError(
@@ -146,7 +146,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
-        # The suffix "-" keeps the fields of the card 10 characters wide.
+        # The suffix "-" keeps the fields of the cards 10 characters wide.
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")
     yield (
         Path(main).name,
@@ -157,7 +157,7 @@ def _write_ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
-    """Raise DeckError if the deck already switches a part on the printed cards, or uses one of their set ids."""
+    """Raise DeckError if the deck already switches a part of the printed cards, or uses one of their set ids."""
     sets = read_switching(deck)
     printed_sets = read_switching(printed)
     parts = {
@@ -183,7 +183,7 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
 
 
 def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> bytes:
-    """Insert cards into the bytes of a main file, before ``*END`` or at its end; ``file_blocks`` are its blocks."""
+    """Insert cards into the bytes of a main file, before ``*END`` or at the end; ``file_blocks`` are its blocks."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
     *_, last = file_blocks
@@ -194,7 +194,7 @@ def insert_cards(main: SourceFile, text: str, file_blocks: Iterable[Block]) -> b
 def copy_files(
     files: Sequence[SourceFile], main: str, taken: set[str]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of the files in and below the folder of the deck; other files need an absolute path."""
+    """Yield the name and content of the files in and below the deck folder; other files need an absolute path."""
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100  resolve() would follow links out of the folder
     for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100  resolve() would follow links out of the folder
@@ -211,7 +211,7 @@ def copy_files(
 
 
 def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each file of a Radioss run with cards."""
+    """Yield the name and content of each file of a Radioss run with cards."""
     run = read_run(main)
     printed = _read_printed_legs(main, card)
     starter_deck = _require_starter(main, run)
@@ -243,7 +243,7 @@ def _write_radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 
 def _require_starter(main: str, run: RadiossRun) -> Starter:
-    """Return the starter deck of a run; raise DeckError if the run lacks a starter deck or an engine file."""
+    """Return the starter deck of a run; raise DeckError if the run has no starter deck or no engine file."""
     if run.starter is None or not run.legs:
         missing = "starter deck" if run.starter is None else "engine file"
         raise DeckError(
@@ -253,7 +253,7 @@ def _require_starter(main: str, run: RadiossRun) -> Starter:
 
 
 def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
-    """Read the engine runs in the printed cards; raise DeckError for the cards of another solver."""
+    """Read the engine runs in the printed cards; raise DeckError for cards of another solver."""
     printed = [
         leg
         for text in card.files.values()
@@ -267,7 +267,7 @@ def _read_printed_legs(main: str, card: PrintedCard) -> list[RadiossLeg]:
 def _keep_bodies_off(
     legs: Sequence[RadiossLeg], printed_leg: RadiossLeg, replaced_nodes: Collection[int]
 ) -> Iterator[str]:
-    """Return lines that keep bodies inactive in a printed engine run; otherwise, they would be rigid from time 0.
+    """Return lines that keep bodies inactive in a printed engine run; otherwise they would be rigid from time 0 on.
 
     Left out are bodies that the leg switches, and those whose main nodes are ``replaced_nodes``.
     """
@@ -283,7 +283,7 @@ def _keep_bodies_off(
 
 
 def _read_repeated_blocks(leg: RadiossLeg, printed_leg: RadiossLeg) -> bytes:
-    """Return the blocks of an engine file that are repeated in a printed engine run."""
+    """Return those blocks of an engine file that are repeated in a printed engine run."""
     return b"".join(
         read_block(block)
         for block in read_blocks(leg.run.block.source)
@@ -314,7 +314,7 @@ def _remove_bodies(source: SourceFile, bodies: Collection[int]) -> bytes:
 
 
 def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
-    """Return a file of the starter deck in which ``sensors``, keyed by main node, switch bodies.
+    """Return a file of the starter deck with bodies switched by ``sensors``, which are keyed by main node.
 
     The /BEGIN of the file gets a version in which time sensors have an end.
 
@@ -337,7 +337,7 @@ def _add_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
 def _edit_lines(
     block: Block, sensors: Mapping[int, int]
 ) -> Iterator[tuple[int, tuple[int, bytes]]]:
-    """Yield each changed line: the offsets of its start and end, and its new bytes."""
+    """Yield each changed line as the offsets of its start and end, and its new bytes."""
     card = make_card(block)
     for row in get_lines_below_title(card)[:1]:
         lines = block.source.read(block.start, block.end).split(b"\n")
@@ -378,7 +378,7 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
 
 
 def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
-    """Raise DeckError if a later engine run has keywords that the first lacks; no single run could represent both."""
+    """Raise DeckError if a later engine run has keywords that the first one lacks: no single run covers both."""
     first = {read_block(block) for block in read_blocks(legs[0].run.block.source)}
     for leg in legs[1:]:
         for block in read_blocks(leg.run.block.source):
@@ -397,7 +397,7 @@ def _refuse_unlike(legs: Sequence[RadiossLeg]) -> None:
 def _refuse_other_run(
     leg: RadiossLeg, root: str, printed: Sequence[RadiossLeg]
 ) -> None:
-    """Raise DeckError if the cards are for another run, or if the run already switches their bodies."""
+    """Raise DeckError if the cards belong to another run, or if the run already switches their bodies."""
     if printed[0].name not in (leg.name, root):
         raise DeckError(
             f"the cards are for run {printed[0].name!r}, but this is run {leg.name!r}; print them with this name"
@@ -415,7 +415,7 @@ def _refuse_other_run(
 
 
 def is_repeated(words: tuple[str, ...], leg: RadiossLeg | EngineFile) -> bool:
-    """Return True if a printed engine run repeats a keyword of the engine file of the run."""
+    """Return True if a printed engine run repeats a keyword from the engine file of the run."""
     if (
         not words
         or words[0] == "RUN"
@@ -428,16 +428,16 @@ def is_repeated(words: tuple[str, ...], leg: RadiossLeg | EngineFile) -> bool:
 
 
 def read_block(block: Block) -> bytes:
-    """Return the lines of a block, with a line end after each."""
+    """Return the lines of a block, each with a line ending."""
     content = block.source.read(block.start, block.end)
     return content if content.endswith(b"\n") else content + b"\n"
 
 
-# The functions below write the engine runs of a driven run, whose times are chosen while it is computed.
+# The functions below write the engine runs of a driven run, whose times are chosen while it is being computed.
 
 
 class DrivenDeck(NamedTuple):
-    """A run to be driven: name, end, switched parts, copied files, and the keywords of each engine run.
+    """A run to be driven: its name, its end, its switched parts, copied files, and the keywords of each engine run.
 
     ``nodes`` are the main nodes of the rigid bodies of ``parts``, ``others`` are main nodes of bodies that stay off.
     ``interval`` is the output interval of the time history. ``second`` is the length of a second in the time unit of
@@ -458,7 +458,7 @@ class DrivenDeck(NamedTuple):
     def leg(
         self, number: int, until: float, cap: float | None, *, frozen: bool = False
     ) -> bytes:
-        """Return the engine file of an engine run; the bodies are rigid if a time-step limit ``cap`` is given.
+        """Write one engine file of the run; the bodies are rigid if a time-step limit ``cap`` is given.
 
         ``frozen``: the bodies are rigid already, and must not be activated again, as OpenRadioss would add their energy
         twice.
@@ -479,7 +479,7 @@ class DrivenDeck(NamedTuple):
 
 
 def read_driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
-    """Read a run whose switch times are to be chosen while the run is computed.
+    """Read a run whose switching times are to be chosen while it is being computed.
 
     Parameters
     ----------
@@ -561,5 +561,5 @@ def _read_interval(leg: RadiossLeg) -> float:
 
 
 def _find_second(run: RadiossRun) -> float | None:
-    """Return the length of a second in the time unit of the deck [time]; None if the deck names no unit."""
+    """Return the length of a second in the time unit of the deck [time]; None if the deck does not give its unit."""
     return _IN_A_SECOND.get(find_time_units(run)[-1])

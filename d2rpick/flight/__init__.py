@@ -1,4 +1,4 @@
-"""Find when the parts fly: the window around td between the end of the load and the next contact.
+"""Find when the parts fly, i.e. the window around td between the end of the load and the next contact.
 
 Free flight means that gravity alone acts on the parts, and damping proportional to mass.  This folder decides in this
 order:
@@ -29,7 +29,7 @@ gravity acts.
 
 from typing import Final
 
-# Names of the data that can show a flight, with the most reliable first.
+# Names of the data that can show a flight, from most to least reliable.
 SOURCES: Final = (
     "given",
     "momentum",

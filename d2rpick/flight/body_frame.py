@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import NodeMotion, Samples
     from d2rpick.histories.names import Part
 
-# A function that reads the motion of given nodes, without the nodes whose motion the solver did not write.
+# A function that reads the motion of those of the given nodes whose motion the solver wrote.
 Displacements = Callable[[Sequence[int]], "NodeMotion | None"]
 
 # Largest deviation of points from their positions in the rotated deck, relative to the size of the body [-].
-# The orientation of a body with a larger deviation cannot be determined to within 0.1 degrees.
+# With a larger deviation, the orientation of the body cannot be determined to within 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# Smallest mass fraction of the connected parts that define the frame of a body [-].
+# If the connected parts have at least this fraction of the mass, only they define the frame of a body [-].
 _MOST: Final = 0.5
-# Largest ratio of one moment of inertia to the others at which points are treated as lying on a line [-].
+# Points are treated as lying on a line if one moment of inertia is at most this fraction of the others [-].
 _ALONG_LINE: Final = 1e-9
-# Relative error of a time that is written in single precision [-].
+# Relative error of a time written in single precision [-].
 _ROUNDED_TIME: Final = 1e-6
-# Number of nodes, spread over the body, that define the frame of the body; more would hardly improve it.
+# Number of nodes, spread over the body, that define its frame; more nodes would hardly improve it.
 _MOST_NODES: Final = 50
 
 
@@ -41,7 +41,7 @@ class Frame(NamedTuple):
 
 
 def fit_frame(deck: Samples, where: Samples, mass: Samples) -> Frame | None:
-    """Fit the orientation of the points of a body to their positions.
+    """Fit the orientation of a body to the positions of its points.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def find_frame_of_nodes(
 
 
 def _is_within(wanted: Samples, written: Samples) -> bool:
-    """Return True if times (n,) lie within the span of the written times (k,), except for rounding."""
+    """Return True if times (n,) lie within the span of the written times (k,), apart from rounding."""
     room = _ROUNDED_TIME * float(np.abs(wanted).max())
     return bool(written[0] <= wanted[0] + room and written[-1] >= wanted[-1] - room)
 
@@ -101,7 +101,7 @@ def choose_frame_parts(
     masses: Samples,
     placement: Placement,
 ) -> Sequence[int]:
-    """Return the parts that define the frame of a body: connected parts that do not move relative to each other.
+    """Return the parts that define the frame of a body, i.e. connected parts that do not move relative to each other.
 
     ``members`` and ``moving`` are columns of the ``parts``, which have these ``masses`` (parts,).
     """
@@ -114,7 +114,7 @@ def choose_frame_parts(
 
 
 def _estimate_doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """Return how much the rotation between two times changes if each part that defines the frame is omitted in turn.
+    """Return how much the rotation between two times varies if each part that defines the frame is omitted in turn.
 
     Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
     line determine no angle and give 0.
@@ -144,7 +144,7 @@ def _fit_orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 
 def _measure_bending(shape: Samples, places: Samples, mass: Samples) -> float:
-    """Return the deviation of points from their shape, relative to the size of the shape along its longest axis [-].
+    """Return the rms deviation of points from a rigid shape, relative to its smallest radius of gyration [-].
 
     Infinite if the points lie on a line.
     """
@@ -163,7 +163,7 @@ def compute_second_moments(places: Samples, mass: Samples) -> Samples:
 
 
 def compute_inertia(second: Samples) -> Samples:
-    """Return the inertia tensor from the second moments (..., 3, 3)."""
+    """Return the inertia tensor computed from the second moments (..., 3, 3)."""
     return np.asarray(
         np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
         - second

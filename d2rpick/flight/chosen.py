@@ -1,4 +1,4 @@
-"""Choose the flight at a td: from evidence of no force, an oscillator, the energy, or times given by the user."""
+"""Choose the flight at a td from evidence that no force acts, an oscillator, the energy, or times given by the user."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
-# Smallest number of extrema of an energy that may vibrate about a level; with fewer, it must be constant.
+# Smallest number of extrema of an energy that vibrates about a level; an energy with fewer must be constant.
 _LEAST_TURNS: Final = 4
 
 
 class Described(NamedTuple):
-    """A window in which an oscillator model describes the vibration, from its first to its last state [time].
+    """A window in which an oscillator model describes the vibration, given by its first and last state [time].
 
     ``energy`` returns the kinetic plus elastic energy of the vibration at times (n,).  ``alpha`` is its damping
     [1/time], None if several modes have different dampings.
@@ -81,7 +81,7 @@ def choose_flight(
 
 
 def _limit_by_supports(history: History, flight: Flight, td: float) -> Flight:
-    """Limit a flight to the time in which no support holds the parts.
+    """Limit a flight to the time during which no support holds the parts.
 
     A flight that was found from the part momenta is already limited in this way.
     """
@@ -100,7 +100,7 @@ def find_flight(
     described: Described | None,
     quiet: QuietTime | None,
 ) -> Flight:
-    """Choose the flight at a td: from the evidence, else from an oscillator, else from the energy alone.
+    """Choose the flight at a td from the evidence, or else from an oscillator, or else from the energy alone.
 
     The arguments are those of `choose_flight`.
     """
@@ -120,7 +120,7 @@ def find_flight(
 def _make_seen_flight(
     history: History, seen: Seen, shown: FreeFlight, described: Described | None
 ) -> Flight:
-    """Return the flight that the evidence shows; if energies do not show gravity, an oscillator is used for this."""
+    """Return the flight that the evidence shows; if energies do not show gravity, an oscillator is used to find it."""
     gravity = shown.gravity
     if described and seen.source in BY_ENERGIES and isnan(gravity):
         window = described._replace(start=shown.start, end=shown.end)
@@ -139,7 +139,7 @@ def _make_seen_flight(
 
 
 def _make_described_flight(history: History, described: Described) -> Flight:
-    """Return the window that an oscillator or modes describe as a flight, unless a load does work in it."""
+    """Return the window that an oscillator or modes describe as a flight, unless a load does work in this window."""
     refusal = _explain_why_fed(history, described.start, described.end)
     if refusal:
         return Flight(refusal=refusal)
@@ -177,7 +177,7 @@ def start_flight_at(
     after: float,
     described: Described | None,
 ) -> Flight:
-    """Start the flight around ``td`` at ``after`` [time], the end of the load as given by the user.
+    """Start the flight around ``td`` at ``after``, the end of the load as given by the user [time].
 
     Evidence against this becomes a doubt.  A contact that the evidence shows between ``after`` and td still ends the
     flight, since the user has said nothing about it.
@@ -204,7 +204,7 @@ def start_flight_at(
     doubts = flight.doubts
     shows_start = (
         flight.source != "oscillator"
-    )  # The oscillator was fitted after `after`, so its start does not show when the load ends.
+    )  # The oscillator was fitted from `after` on, so its start is not the end of the load.
     if shows_start and after < flight.start - get_agreement_limit(
         history, *flight.within(history.time)
     ):
@@ -219,7 +219,7 @@ def start_flight_at(
 def end_flight_at(
     history: History, flight: Flight, td: float, landing: float
 ) -> Flight:
-    """End the flight around ``td`` at ``landing`` [time], the next contact as given by the user.
+    """End the flight around ``td`` at ``landing``, the next contact as given by the user [time].
 
     Evidence against this becomes a doubt.
     """
@@ -249,7 +249,7 @@ def end_flight_at(
 
 
 def _is_elsewhere(flight: Flight, td: float, after: float) -> bool:
-    """Return True if td is in no flight, and the nearest flight ends before ``after`` or begins after td."""
+    """Return True if td is not in a flight, and the nearest flight ends before ``after`` or begins after td."""
     if not flight.refusal or flight.start is None:
         return False
     return flight.start > td or (flight.end is not None and flight.end <= after)
@@ -282,7 +282,7 @@ def _detect_load_in_window(history: History, described: Described) -> float:
 
 
 def _explain_why_fed(history: History, start: float, end: float) -> str | None:
-    """Return the reason why a window cannot be a flight according to the energies; None if there is no such reason.
+    """Return the reason why, according to the energies, a window cannot be a flight; None if there is none.
 
     Either kinetic plus internal energy changes, or nothing but the vibration moves.
     """

@@ -1,4 +1,4 @@
-"""Find flights from contact and rigid-wall forces: a flight is a window without any such force.
+"""Find flights from contact and rigid-wall forces; a flight is a window in which no such force acts.
 
 Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
 its parts, and a contact whose force is not written, or any other load, may act all the same.
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Smallest momentum change of the model, as a fraction of a contact's impulse [-], that shows an external contact.
+# Smallest momentum change of the model that shows an external contact, relative to the contact's impulse [-].
 # The output may miss up to 1/3 of the impulse of an intermittent contact.
 _INNER: Final = 0.2
 # _PIECES: number of sections of a flight whose mean energies are compared.
-# _RISE: smallest rise of the mean energy that shows a crash, as a fraction of the highest energy [-].
-# In computed flights with many beating modes, the mean energy rises by up to 0.06 of the highest energy.
+# _RISE: smallest rise of the mean energy that shows a crash, relative to the highest energy [-].
+# In computed flights with many beating modes, the mean energy rises by up to 6 % of the highest energy.
 # In a crash, the mean energy rises from nearly zero to nearly the highest energy.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
 
 class Touches(NamedTuple):
-    """The intervals with a contact force: ``acts`` (n,) belongs to the interval that ends at state ``time`` (n,)."""
+    """The intervals with a contact force; ``acts`` (n,) refers to the interval that ends at state ``time`` (n,)."""
 
     time: Samples
     acts: NDArray[np.bool_]
@@ -66,7 +66,7 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Return the window without contact around ``td`` [time]; None if it is too short, or if a contact acts at td.
+        """Return the window without contact around ``td`` [time]; None if it is too short or a contact acts at td.
 
         Forces do not show whether gravity acts, so gravity is NaN.
         """
@@ -140,7 +140,7 @@ def _sum_impulses_between(force: ContactForce, time: Samples) -> Samples:
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
-    """Return True if the internal energy rises during the flight, which shows a load that is missing in the files.
+    """Return True if the internal energy rises during the flight, which shows a load that the files do not contain.
 
     In a flight the energy vibrates about its level or falls by damping.
     """

@@ -1,4 +1,4 @@
-"""Find when a force other than gravity acts on the parts, for each output interval, from their momenta.
+"""Find in which output intervals a force other than gravity acts on the parts, from their momenta.
 
 In flight the momentum changes between two states by gravity alone.  The longest flight shows this change.  If the
 momentum changes by more than that, and by more than numerical errors, a force acts.  A force that starts and ends
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# Smallest ratio of a momentum change to the largest deviation in the longest flight that shows a force [-].
+# Smallest momentum change that shows a force, relative to the largest deviation in the longest flight [-].
 _SEEN: Final = 4.0
-# Largest force that is ignored, as a fraction of the weight [-], because the first momenta are half a step old.
+# Largest force that is ignored, relative to the weight [-]; the first momenta are half a time step old.
 _OF_WEIGHT: Final = 0.1
 # Number of states omitted at each end of the longest flight, because a contact force may act in them.
 _EDGE: Final = 1
-# Smallest number of output intervals of the longest flight, without its ends.
+# Smallest number of output intervals in the longest flight without its ends.
 _FEWEST: Final = 2
-# Assumed duration of a force in the middle of the only interval that shows it, as a fraction of the interval [-].
+# Assumed duration of a force that a single interval shows, centred in the interval, as a fraction of it [-].
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """Periods in which a force acts: ``spans`` (from, to) [time]; each end is accurate to half of ``interval``.
+    """Periods in which a force acts: ``spans`` (from, to) [time], whose ends are accurate to half of ``interval``.
 
     ``speed`` is the speed of the parts at the end of the longest flight [length/time], None if there are no masses.
     """
@@ -135,7 +135,7 @@ def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | 
 
 
 def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
-    """Return start and end [time] of a force that acts in the intervals from ``first`` up to ``stop`` of the record.
+    """Return the start and end of a force that acts in the intervals ``first`` to ``stop`` of the record [time].
 
     A force in the first interval is assumed to act from the start of the record, one in the last interval to its end.
     """

@@ -1,4 +1,4 @@
-"""Find the parts of a switched run that are deformable again in a flight after its rigid windows.
+"""Find the parts of a switched run that are deformable again in a flight after the rigid windows.
 
 While a rigid body has absorbed parts, their momenta are not written, and the flights of a switched run are those of the
 whole model.  In a flight during which the momenta of the parts add up to that of the model, they show how the parts
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @remember
 def restore_parts(history: History, flight: Flight) -> tuple[History, Flight]:
-    """Return the record and a flight of the whole model with the parts that move in it, if they are deformable.
+    """Return the record and a flight of the whole model with the parts that move in it, if these are deformable.
 
     Record and flight are returned unchanged if the flight has parts, or if a rigid body has absorbed parts in one of
     its states. The momenta of the parts are those of the states around the flight in which no part is absorbed.

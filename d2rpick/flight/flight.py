@@ -1,4 +1,4 @@
-"""Decide when the parts fly: from the most reliable data that show a window around td in which only gravity acts."""
+"""Decide when the parts fly, from the most reliable data that show a window around td in which only gravity acts."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# Largest work of a load on the parts in a flight, as a fraction of their internal energy [-].
+# Largest work of a load on the parts in a flight, relative to their internal energy [-].
 # This work causes a deformation error of 2 %; smaller errors do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
 # Sources that must confirm each flight from a more reliable source, because they cover the contacts of all parts.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# Sources that may miss a load, because some forces are not written, and because fixed walls do no work.
+# Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Largest difference of two flight ends that agree, as a fraction of the flight [-] and in output intervals [-].
+# Two flight ends agree up to this difference, as a fraction of the flight [-] and in output intervals [-].
 _SAME, _SAME_STATES = 0.01, 3
 
 
@@ -76,17 +76,17 @@ class Flight(NamedTuple):
 
     @property
     def by_parts(self) -> bool:
-        """Return True if part momenta show the flight, so that contacts of other parts do not matter."""
+        """Return True if part momenta show the flight, so that contacts between other parts do not matter."""
         return self.source == "momentum" and self.parts is not None
 
     @property
     def unknown_load(self) -> bool:
-        """Return True if a load of unknown kind acts in the flight: gravity, a pull or friction."""
+        """Return True if a load of unknown type acts in the flight: gravity, a pull or friction."""
         return self.source != "given" and not isfinite(self.gravity)
 
     @property
     def certain(self) -> bool:
-        """Return True if the evidence excludes everything but a free flight.
+        """Return True if the evidence excludes everything except a free flight.
 
         A fixed rigid wall does no work and has no contact energy.  Without the momentum, only an oscillator that goes
         on swinging distinguishes a flight from a crash into such a wall.
@@ -97,7 +97,7 @@ class Flight(NamedTuple):
 
 
 def _explain_nothing(_: float) -> None:
-    """Return no contradiction for any time, as the default of ``explain_contradiction``."""
+    """Return no contradiction for any time, as the default for ``explain_contradiction``."""
 
 
 class Witness(NamedTuple):
@@ -124,7 +124,7 @@ class Witness(NamedTuple):
         decisive: bool,
         explain_contradiction: Callable[[float], str | None] = _explain_nothing,
     ) -> Witness:
-        """Make a source of evidence over the times ``time`` (n,) that computes each flight and their list only once."""
+        """Make a source of evidence over the times ``time`` (n,) that computes each flight, and their list, once."""
         once = cache(around)
         return cls(
             source,
@@ -142,18 +142,18 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td. The search begins at a fixed start time within the flight, or else at td."""
+        """Return the flight around td, searched from a fixed time within it if possible, otherwise from td."""
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
-        """Return True if the absence of a flight in this source proves that there is none at a time."""
+        """Return True if a time at which this source shows no flight is certainly in no flight."""
         return self.decisive or bool(self.flights())
 
 
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``. The search begins at a time that many td share, or else at td itself."""
+    """Return the flight around ``td``, searched from a time shared by many td if possible, otherwise from td."""
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -163,7 +163,7 @@ def _find_flight_with_td(
 def _find_flight_from_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Return the flight around a time; the search is repeated from its middle, so that it equals the listed flight."""
+    """Return the flight around a time; search again from its middle to obtain the same flight as in the list."""
     flight = around(moment)
     if flight:
         of_middle = _find_flight_with_td(time, around, (flight.start + flight.end) / 2)
@@ -175,7 +175,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is in no flight.
+    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is not in a flight.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -204,7 +204,7 @@ def find_seen_flight(history: History, td: float) -> Seen:
 
 
 def _find_flight_by_evidence(history: History, td: float) -> Seen:
-    """Find the flight around ``td`` from all sources of evidence; supports are not considered yet."""
+    """Find the flight around ``td`` from all sources of evidence, without considering supports."""
     flights: list[tuple[str, FreeFlight]] = []
     for witness in list_witnesses(history):
         flight = witness.holding(td)
@@ -223,7 +223,7 @@ def _find_flight_by_evidence(history: History, td: float) -> Seen:
 
 
 def _explain_refusal(witness: Witness, td: float) -> str:
-    """Return the reason why td [time] is in no flight, even if the momentum alone shows a flight there."""
+    """Return the reason why td [time] is not in a flight, even if the momentum alone shows a flight there."""
     contradiction = witness.explain_contradiction(td)
     if contradiction:
         return contradiction
@@ -275,12 +275,12 @@ def _can_deny(witness: Witness, flight: FreeFlight) -> bool:
 
 @remember
 def list_witnesses(history: History) -> tuple[Witness, ...]:
-    """Return the sources of evidence for the flights in a history, with the most reliable first."""
+    """Return the sources of evidence for the flights in a history, from most to least reliable."""
     return tuple(_make_witnesses(history))
 
 
 def _make_witnesses(history: History) -> Iterator[Witness]:
-    """Compute the sources of evidence for the flights in a history, with the most reliable first."""
+    """Compute the sources of evidence for the flights in a history, from most to least reliable."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -334,7 +334,7 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
 def _explain_contradicted_momentum(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> str | None:
-    """Return what the energies say against a flight that the momentum alone shows at ``td`` [time], if it shows one."""
+    """Return how the energies contradict a flight that only the momentum shows at ``td`` [time]; None if they agree."""
     from d2rpick.flight.momentum import find_flight_around
 
     flights = [
@@ -356,7 +356,7 @@ def _explain_contradicted_momentum(
 def _find_flight_by_momentum(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td`` from the momentum of the parts, or else of the whole model."""
+    """Return the flight around ``td`` from the momentum of the parts or, if there is none, of the whole model."""
     from d2rpick.flight.momentum import find_flight_around
 
     for candidate in momenta:
@@ -372,7 +372,7 @@ def _find_flight_by_momentum(
 def _limit_to_undriven(
     history: History, flight: FreeFlight, td: float
 ) -> FreeFlight | None:
-    """Return the part of a flight by momentum in which no load does work on the model; None if one does at td.
+    """Return the part of a flight shown by the momentum in which no load does work; None if one does at td.
 
     Opposite forces, and weak ones, drive the model although its momentum hardly shows them.
     """
@@ -417,7 +417,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces; if the energy rises, only the part with a steady energy level.
+    """Return the flight around td from contact forces, limited to times with one energy level if the energy rises.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -442,7 +442,7 @@ def _limit_to_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Return the part of a flight in which the internal energy stays on one level; None if td is earlier.
+    """Limit a flight to the time span in which the internal energy stays on one level; None if td is before that span.
 
     ``momenta`` are those that show the flight.
     """
@@ -499,7 +499,7 @@ def _limit_to_level(
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """Return the last flight before ``td``, or else the first flight after it, for a td that is in no flight."""
+    """For a td outside of flights, return the last flight before it if there is one, otherwise the next one."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (
@@ -509,7 +509,7 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return the name in words of the data that show a flight."""
+    """Return a phrase that names the data that show a flight."""
     return str(source).replace("-", " ")
 
 
@@ -555,7 +555,7 @@ def get_agreement_limit(history: History, start: float, end: float) -> float:
 def _explain_why_driven(
     history: History, source: str, flight: FreeFlight
 ) -> str | None:
-    """Return the reason why a load drives a flight; None if no load does work, or if it acts only on other parts."""
+    """Return the reason why a load drives a flight; None if no load does work, or if it acts on other parts only."""
     from d2rpick.flight.work import compute_work_beyond_gravity
 
     balance = history.balance
@@ -572,7 +572,7 @@ def _explain_why_driven(
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
-    """Return True if only some of the moving parts of the model fly."""
+    """Return True if only some of the model's moving parts fly."""
     momenta = history.find_momenta(of_parts=True)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False

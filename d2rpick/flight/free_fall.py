@@ -1,4 +1,4 @@
-"""Fit a free fall to a momentum: the only forces are gravity and mass-proportional damping.
+"""Fit a free fall to a momentum; gravity and mass-proportional damping are the only forces in it.
 
 Parts that fly together obey p' = g - alpha p in each component, with constant g and one alpha >= 0, so that p(t) = p0 +
 g t - alpha int p dt, which is linear in p0, g and alpha.
@@ -31,45 +31,45 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, Momenta, Samples
 
-# _GRAVITY: gravity in m, inches and feet per second squared; in other units, it differs by a power of 10.
-# _ALIKE: largest relative deviation of an acceleration that is treated as gravity [-]; 1 load in 200 lies within it.
+# _GRAVITY: gravity in m, inches and feet per second squared; other units change it by a power of 10.
+# _ALIKE: largest relative deviation of an acceleration treated as gravity [-]; 1 in 200 loads lies within it.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
-# Usual values of gravity in decks, in m, inches and feet per second squared, up to a power of 10.
+# Usual values of gravity in decks in m, inches and feet per second squared, up to a power of 10.
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Ratio of the rounding error of the fitted momentum change to the rounding error of the momentum itself [-].
+# Ratio of the rounding error in a fitted momentum change to the rounding error in the momentum itself [-].
 _REACH_OF_DIGITS = 10.0
-# _ROUGHLY: relative tolerance for the size of gravity while a load fades [-].
-# _ALONG_AXIS: smallest direction cosine of gravity with an axis while a load fades [-].
+# _ROUGHLY: relative tolerance for the magnitude of gravity while a load fades [-].
+# _ALONG_AXIS: smallest direction cosine between gravity and an axis while a load fades [-].
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# _DAMPED: largest momentum loss in a window that is certainly due to damping, as a fraction of the momentum [-].
-# _LEFT: smallest remaining fraction of the largest momentum at which a greater loss is still due to damping [-].
+# _DAMPED: a loss of at most this fraction of the momentum in a window is always attributed to damping [-].
+# _LEFT: a loss above _DAMPED is attributed to damping if this fraction of the largest momentum remains [-].
 _DAMPED, _LEFT = 0.2, 0.05
-# Largest momentum loss between successive states that is due to damping, as a fraction of the momentum [-].
+# A loss of at most this fraction of the momentum between successive states is attributed to damping [-].
 _SHOWN = 0.1
-# Largest deviation of the momentum in a window without loads, as a fraction of its largest value and of its range [-].
+# Largest deviation of the momentum in a window without loads, relative to its largest value and to its range [-].
 # A fading load that causes this deviation may change the momentum by twice as much over the window.
-# For some of the moving parts, TOLERANCE is used instead, because the other parts of their body act on them.
+# If only some of the moving parts are tested, TOLERANCE replaces this limit, because other parts act on them.
 _ENOUGH = 3e-3
-# The three constants below are used to find gravity at right angles to a load of constant direction.
-# _REACH_OF_NOISE: largest deviation of the momentum at right angles to the load, in rounding errors [-].
-# _SEEN: smallest component at right angles to the load of an axis along which gravity may act [-].
-# _CLEARLY: smallest ratio of the deviation along the load to the deviation at right angles to it [-].
+# The next three constants are used to find gravity perpendicular to a load of constant direction.
+# _REACH_OF_NOISE: largest deviation of the momentum component perpendicular to the load due to noise [rounding errors].
+# _SEEN: smallest component perpendicular to the load of an axis along which gravity may act [-].
+# _CLEARLY: smallest ratio of the deviation along the load to the deviation perpendicular to it [-].
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# _FADED: largest force in the last third of a window, relative to the first third, of a force that fades [-].
-# _LITTLE: largest force at the end of a window, relative to the weight, of a force that fades [-].
+# _FADED: largest force in the last third of a window in which a force fades, relative to the first third [-].
+# _LITTLE: largest force at the end of a window in which a force fades, relative to the weight [-].
 _FADED, _LITTLE = 0.6, 0.02
-# Largest momentum perpendicular to the direction of a straight motion, as a fraction of the momentum [-].
+# Largest momentum perpendicular to the direction of a straight motion, relative to the momentum [-].
 _STRAIGHT = 0.01
 # Largest change of momentum that is treated as zero, in multiples of the fitting error [-].
 _UNSEEN = 2.0
-# Relative error of the work of gravity that is computed from the states [-].
+# Relative error of the work of gravity computed from the states [-].
 _OF_WORK = 2e-3
-# Smallest relative excess of a mass written by the solver over the lower bound from momenta and energies [-].
+# A mass that exceeds the lower bound from momenta and energies by this fraction was written by the solver [-].
 _CLEARLY_HEAVIER = 1e-6
 
 
 class Laws:
-    """Laws of free flight for one set of parts: only gravity and damping act, or no force at all.
+    """Laws of free flight for one set of parts: either only gravity and damping act, or no force acts at all.
 
     A constant net force does not prove gravity, and a push that fades exponentially looks like damping under such a
     force.  The force is accepted only if it is the mass times one of the deck's accelerations ``gravities`` (0: none
@@ -108,12 +108,12 @@ class Laws:
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
-        ):  # A push that balances the weight for a moment also keeps the momentum constant.
+        ):  # A push that briefly balances the weight keeps the momentum constant, too.
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
-        """Return gravity between two states of a flight [length/time^2]; 0 if there is no gravity, NaN if unknown.
+        """Return gravity between two states of a flight [length/time^2]; 0 if there is none, NaN if it is unknown.
 
         The result is None if the force slows the parts down like a brake, or if the force is not gravity.
         """
@@ -122,14 +122,14 @@ class Laws:
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
-        """Return the states around ``td`` that obey a law, even with a stricter tolerance."""
+        """Return the states around ``td`` that obey a law of motion even with a tighter tolerance."""
         return find_lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
 
     @property
     def _carried(self) -> bool:
-        """Return True if parts without a visible force must be carried by a support."""
+        """Return True if the parts must be carried by a support whenever no force on them is visible."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
@@ -142,7 +142,7 @@ class Laws:
         )
 
     def _braked(self, first: int, last: int) -> bool:
-        """Return True if a load stops the parts like strong damping: within a few states, or almost completely."""
+        """Return True if a load, unlike damping, stops the parts within a few states or almost completely."""
         largest, final_size = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
@@ -154,7 +154,7 @@ class Laws:
         )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Return the window around ``td`` in which gravity has a usual size. A fading load may still act in it."""
+        """Return the window around ``td`` in which gravity has a usual magnitude. A fading load may still act in it."""
         time = self.fit.time
         momentum = self.fit.momentum
         first, last = self._around(td)
@@ -192,7 +192,7 @@ class Laws:
         return find_longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Yield possible weights (3,) along an axis, from the momentum at right angles to a load of fixed direction."""
+        """Yield possible weights (3,) along an axis, from the momentum perpendicular to a load of fixed direction."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time = self.fit.time[first : last + 1]
@@ -235,7 +235,7 @@ class Laws:
             )
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
-        """Return True if the force in a window, minus the ``weight`` (3,), fades and is small at the end."""
+        """Return True if the force in a window minus the ``weight`` (3,) fades and is small at the end."""
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
@@ -281,7 +281,7 @@ class Laws:
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
-        """Return True if a force may be gravity on a larger mass than the lower bound from the kinetic energy.
+        """Return True if a force may be the weight of a mass above the lower bound that the kinetic energy implies.
 
         At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
         energy swings.
@@ -337,7 +337,7 @@ class Laws:
 
     @cached_property
     def fall(self) -> bool:
-        """Return True if the parts fall under gravity at some time. If they never do, something supports them."""
+        """Return True if the parts fall under gravity at any time. If they never do, something supports them."""
         # A preliminary value is set, because the computation of `fall` needs one.
         self.fall = False
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
@@ -351,7 +351,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Return True if the momentum perpendicular to a load shows gravity at some time."""
+        """Return True if the momentum perpendicular to a load shows gravity at any time."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
@@ -362,7 +362,7 @@ class Laws:
 def _list_gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """Yield the gravities close to an acceleration, from the ``known`` values or else from the usual values."""
+    """Yield values of gravity close to an acceleration, from the ``known`` values or, by default, the usual ones."""
     if known is not None:
         yield from (
             gravity
@@ -377,7 +377,7 @@ def _list_gravities_near(
 
 
 def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> bool:
-    """Return True if an acceleration [length/time^2] equals gravity on earth within a relative error.
+    """Return True if an acceleration [length/time^2] equals gravity on Earth within a relative error.
 
     Units of length and time change it by powers of ten, ``decades`` at a time.
 
@@ -438,13 +438,13 @@ def find_acceleration_by_work(
 
 
 class FreeFall(Law):
-    """Least-squares fits of free flight to windows of one momentum record; the misfit has the unit of a momentum."""
+    """Least-squares fits of free flight to windows of one momentum record; the misfit has the unit of the momentum."""
 
     def __init__(self, time: Samples, momentum: Samples) -> None:
         super().__init__(time)
         self.momentum = momentum
         self.integral = integrate_by_trapezia(time, momentum)
-        # Columns that are contiguous in memory are faster to process.
+        # Columns that are contiguous in memory can be processed faster.
         self._both = np.asfortranarray(np.hstack([momentum, self.integral]))
 
     def _misfit(self, first: int, last: int) -> float:
@@ -460,7 +460,7 @@ class FreeFall(Law):
         return self._fitted(first, last)[2]
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
-        """Return the gravity fitted between two states, by default over all, shape (components,) [momentum/time]."""
+        """Return the gravity fitted between two states (default: all states), shape (components,) [momentum/time]."""
         last %= self.time.size
         states = slice(first, last + 1)
         undamped = (

@@ -24,42 +24,42 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Fraction by which the energy band before td is widened [-], because it may not contain a complete vibration.
+# Widening of the energy band before td, as a fraction of the band [-]; the band may not cover a whole oscillation.
 _BAND_RESERVE: Final = 0.25
 # Fraction of the time before td that is not used for the energy band [-], because the load may still act in it.
 # In 45 computed runs, the energy entered its band too early by up to 30 % of the time before td.
 _WAIT: Final = 1 / 3
 # _OUTER: fraction of the lowest and of the highest energies that lie outside the usual range [-].
 # _LATEST: fraction of the time before td in which the usual rate of change of the energy is measured [-].
-# _FASTER: smallest ratio of the rate of change in a contact to the usual rate of change before td [-].
+# _FASTER: smallest rate of change that shows a contact, relative to the usual rate of change before td [-].
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# Fraction of the time without load over which the energy is averaged to obtain its level [-].
-# The level has changed once the mean energy leaves the band of the means before td, widened by its width at both ends.
+# Averaging time for the level of the energy, as a fraction of the time without load [-].
+# The level has changed once the mean energy leaves the range of the means before td, extended by its width both ways.
 _LEVEL: Final = 1 / 8
-# _KNOWN: fraction of the time before a landing with which the landing is compared to be detected [-].
-# _TURNED: smallest number of energy extrema in the time with which a landing is compared.
+# _KNOWN: fraction of the time before a possible landing that sets the energy range for comparison [-].
+# _TURNED: smallest number of energy extrema that are required in the time that sets this range.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Widening of the energy band of a flight's last quarter such that it contains all its energies, in band widths [-].
+# Widening that makes the energy band of a flight's last quarter contain all energies of the flight [band widths].
 _RESERVE: Final = 0.5
-# Largest difference of the mean energies in the last two quarters of a flight, as a fraction of the energy band [-].
-# A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the width of the energy band.
-# A steady drift changes the mean energies of the two quarters by the width of the energy band.
+# Largest difference between the mean energies in the last two quarters of a flight, relative to the energy band [-].
+# A vibration with 3/4 of a period in each quarter changes the mean energies by 30 % of the band width.
+# A steady drift changes the mean energies of the two quarters by the band width.
 _DRIFT: Final = 0.35
-# Smallest number of oscillations over half of its range in a slow vibration; a crash has fewer.
+# A slow vibration swings through half of its energy range at least this often; a crash swings less often.
 _SWINGS: Final = 4
 # Smallest energy range in each half of a flight with a slow vibration, as a fraction of the total range [-].
 _ALIKE: Final = 0.75
-# _TO_ZERO: largest minimum of the energy of a single vibration, as a fraction of its peaks [-].
-# _HARDLY: largest oscillation of the energy that is ignored, as a fraction of the plastic energy [-].
+# _TO_ZERO: largest minimum of the energy of a single vibration, relative to its peaks [-].
+# _HARDLY: largest oscillation of the energy that is ignored, relative to the plastic energy [-].
 _TO_ZERO, _HARDLY = 0.05, 1e-3
-# _FLAT: largest relative distance from its later level of the energy of a body that yields in its first swing [-].
-# _MOST_FLAT: longest time for which the energy stays near its minimum, as a fraction of the time in which it rises [-].
+# _FLAT: tolerance for the minimum and the later level of the energy of a yielding body, relative to its rise [-].
+# _MOST_FLAT: longest time for which the energy stays near its minimum, relative to its rise time [-].
 # The energy of a harmonic motion stays near its minimum for 0.7 of its rise time.
 # The energy of a body that collides later stays near its minimum for longer.
 _FLAT, _MOST_FLAT = 0.1, 1.0
-# Largest rise of the total energy during yielding, which kinetic energy feeds, relative to the yielding energy [-].
+# Largest rise of the total energy while a body yields and loses kinetic energy, relative to the yielding energy [-].
 _NOT_FROM_MOTION: Final = 0.1
 
 
@@ -123,7 +123,7 @@ def _select_states(history: History, start: float, stop: int) -> slice:
 
 @remember
 def find_landing_after(history: History, start: float) -> float | None:
-    """Return the first time after ``start`` at which the energy quickly leaves its former range [time]; None if none.
+    """Return the first time [time] after ``start`` at which the energy quickly leaves its former range; None if never.
 
     The energy is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's
     width: no vibration goes so far beyond its range of so long a time.
@@ -151,7 +151,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the last time before td at which the energy enters its band, as the end of the load [time]; None if none.
+    """Return the end of the load [time], the last time before td at which the energy enters its band; None if unknown.
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
@@ -179,7 +179,7 @@ def find_end_of_load(history: History, td: float) -> float | None:
 
 
 def _find_last_excursion(history: History, states: slice) -> float | None:
-    """Return the time of the last of some states at which the energy is far from its usual values; None if none."""
+    """Return the last time in the given states at which the energy is far from its usual values; None if never."""
     energy = history.energy[states]
     if energy.size < FEWEST:
         return None
@@ -189,7 +189,7 @@ def _find_last_excursion(history: History, states: slice) -> float | None:
 
 
 def _find_last_push(history: History, states: slice, latest: float) -> float | None:
-    """Return the time of the last of some states to which the energy changes much faster than usual; None if none.
+    """Return the time in the given states at which the last unusually fast energy change ends; None if there is none.
 
     Usual are the rates from the time ``latest`` on.
     """
@@ -209,21 +209,21 @@ def _compute_rates(history: History) -> Samples:
 
 
 def _find_burst(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the energy leaves its band in these states; None if none."""
+    """Return the first time [time] after the given states at which the energy exceeds their band; None if never."""
     top = _widen_band(history.energy[states], _BAND_RESERVE)[1]
     above = np.flatnonzero(history.energy[states.stop :] > top)
     return float(history.time[states.stop :][above[0]]) if above.size else None
 
 
 def _find_change_of_level(history: History, states: slice) -> float | None:
-    """Return the first time after some states at which the mean energy leaves the band of their means; None if none."""
+    """Return the first time after the given states at which the mean energy leaves their band; None if never."""
     count = states.stop - states.start
     width = round(_LEVEL * count)
     if width < 1:
         return None
     sums = _sum_energies(history)[states.start :]
     means = (sums[width:] - sums[:-width]) / width
-    # The mean with the index ``count`` is the first mean taken over later states only.
+    # The mean with the index ``count`` is the first one taken over later states only.
     low, high = _widen_band(means[: count - width + 1], 1.0)
     outside = np.flatnonzero((means[count:] < low) | (means[count:] > high))
     if outside.size:
@@ -238,14 +238,14 @@ def _sum_energies(history: History) -> Samples:
 
 
 def _widen_band(values: Samples, share: float) -> tuple[float, float]:
-    """Return the band of some values, widened at both ends by a fraction of its width."""
+    """Return the band of the given values, widened at both ends by a fraction of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 
 
 @remember
 def round_off(history: History) -> float:
-    """Return the energy below which an internal energy is only round-off of the largest energy of the run [energy]."""
+    """Return the energy below which an internal energy is only round-off of the largest energy in the run [energy]."""
     balance = history.balance
     terms: list[Samples | None] = []
     if balance:
@@ -272,7 +272,7 @@ def find_settled_time(
     *,
     driven: bool = False,
 ) -> float | None:
-    """Return the time in a window after which an internal energy keeps its level; None if it drifts until the end.
+    """Return the time in a window from which on an internal energy keeps its level [time]; None if it still drifts.
 
     Parameters
     ----------
@@ -359,14 +359,14 @@ def rises_as_it_yields(
 
 
 def _sum_later_losses(damped: Samples) -> Samples:
-    """Return the energy that damping takes from each state to the last quarter of a window, shape (n,) [energy]."""
+    """Return the energy that damping removes from each state to the last quarter of a window, shape (n,) [energy]."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
 
 
 def _find_first_kept(energy: Samples, lost: Samples, least: float) -> int | None:
-    """Return the first state from which an energy stays on the level of its last quarter; None if it drifts there.
+    """Return the first state from which on an energy stays on the level of its last quarter; None if it drifts there.
 
     What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """
@@ -394,10 +394,10 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
     if width <= least:
         return True
     first_half, second_half = np.array_split(energy, 2)
-    # Near the end of a fall, the sum of energies is larger than in its last quarter, although damping takes nothing.
+    # Near the end of a fall, the sum of energies is larger than in the last quarter, although damping takes nothing.
     taken = 0.0 if np.isinf(lost[0]) else float(lost[0])
     drift = float(second_half.mean() - first_half.mean())
-    # What is taken from the energy explains a fall, but no rise.
+    # Energy that damping takes explains a decrease, but not an increase.
     explained = taken if drift < 0 else 0.0
     if abs(drift) > _DRIFT * _ALIKE * width + explained:
         return False
@@ -407,7 +407,7 @@ def _has_slow_swings(energy: Samples, lost: Samples, least: float) -> bool:
 
 
 def _count_large_swings(energy: Samples, least: float) -> int:
-    """Count the extrema of an energy after changes of at least ``least``."""
+    """Count the extrema of an energy that follow changes of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns = 0
     low = energy[0]
@@ -428,7 +428,7 @@ def _count_large_swings(energy: Samples, least: float) -> int:
 
 
 def has_whole_motion(balance: Balance, start: float, end: float) -> bool:
-    """Return True if a window has more kinetic energy than the vibration in the internal energy accounts for."""
+    """Return True if a window has more kinetic energy than the vibration of the internal energy accounts for."""
     inside = find_window(balance.time, start, end)
     if (
         balance.kinetic is None

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
 
 # Smallest margin, as a fraction of the flight [-].
-# In 36 computed OpenRadioss runs, switching moved the landing by up to 2.5 % of the flight.
+# In 36 computed OpenRadioss runs, switching shifted the landing by up to 2.5 % of the flight.
 LEAST_MARGIN: Final = 0.03
-# Largest relative change of a momentum in a flight that is treated as rounding [-].
+# Largest relative change of a momentum in a flight that is treated as rounding error [-].
 _ROUNDING: Final = 1e-5
-# Smallest number of states needed to determine a force.
+# Smallest number of states from which a force is determined.
 _FEWEST: Final = 3
-# A small position error can move a grazing contact, in which surfaces slide along each other, to a much earlier time.
-# _GRAZING_FORCE: largest force of a contact that grazes the body, as a fraction of the largest force on the body [-].
-# _GRAZING_MOMENTUM: largest momentum change in a grazing contact, as a fraction of the approach momentum [-].
+# A small position error can make a grazing contact, in which surfaces slide along each other, occur much earlier.
+# _GRAZING_FORCE: largest force of a grazing contact, relative to the largest force on the body [-].
+# _GRAZING_MOMENTUM: largest momentum change in a grazing contact, relative to the approach momentum [-].
 # A landing takes at least 25 % of the momentum in theory, and took at least 27 % in computed runs of cars and boxes.
 # The grazing contact of a computed car took 2 % of the momentum.
 _GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
@@ -54,7 +54,7 @@ def compute_margin(
     place: float | None = None,
     turning: float | None = None,
 ) -> Margin:
-    """Return the margin before the contact that ends a flight: the user's margin if there is one, or else an estimate.
+    """Return the margin before the contact that ends a flight: the user's margin or, by default, an estimate.
 
     The margin is at least 3 % of the flight, and 0 if no contact is seen.
 
@@ -97,7 +97,7 @@ def estimate_landing_spread(
     place: float | None,
     turning: float | None = None,
 ) -> float | None:
-    """Return how far a switch may shift the next landing, by its velocity error and its position error [time].
+    """Return how far a switch may shift the next landing [time], given its velocity error and its position error.
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
     towards the ground where it touches: the speed of its centre of mass and what its rotation adds, ``turning``
@@ -117,7 +117,7 @@ def estimate_landing_spread(
 def estimate_grazing_spread(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    r"""Return how much earlier a grazing contact may come [time]: infinite if there is no gravity, None if unknown.
+    r"""Return how much earlier a grazing contact may occur [time]: infinite without gravity, None if unknown.
 
     If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
     ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
@@ -138,7 +138,7 @@ def estimate_grazing_spread(
 
 
 class _Contact(NamedTuple):
-    """Momentum of a body, gravity, and the other forces on the body, at the ``time`` of all states (n,).
+    """Momentum of a body, gravity, and the other forces on the body, at the times ``time`` of all states (n,).
 
     ``begin`` is the last state before the contact that ends the flight.
     """
@@ -300,7 +300,7 @@ def compute_energy_of_approach(history: History, flight: Flight) -> float | None
 
 
 def _get_momentum_in_flight(history: History, flight: Flight) -> Samples | None:
-    """Return the momentum of the flying parts, shape (k, 3 or 1); None if it is unknown or other parts move too."""
+    """Return the momentum of the flying parts, shape (k, 3 or 1); None if it is unknown or other parts move as well."""
     momentum_of_body = select_momenta_of_flight(history, flight)
     if momentum_of_body is None:
         return None
@@ -343,7 +343,7 @@ def find_direction_of_approach(history: History, flight: Flight) -> Samples | No
 
 
 def compute_closing_speed(history: History, flight: Flight) -> float | None:
-    """Return the speed along gravity at the end of a flight [length/time], which is negative for a body that rises.
+    """Return the speed along gravity at the end of a flight [length/time]; it is negative for a rising body.
 
     If there is no gravity, the result is the whole speed.  None if the momentum or the mass is unknown.
     """

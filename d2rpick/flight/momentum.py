@@ -37,21 +37,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Smallest ratio of window lengths at which a larger set of parts is preferred [-].
+# A larger set of parts is preferred if its window is at least this long, relative to that of a smaller set [-].
 # A part with a large momentum, such as a sled, increases the tolerance and the window lengths of all parts.
 _LONGER = 1.1
-# _LOOK_BACK: fraction of the record before td in which attached parts are determined [-].
+# _LOOK_BACK: fraction of the record before td from which attached parts are determined [-].
 # _LOOK_STATES: largest number of states from which attached parts are determined.
-# _CANCELS: largest relative deviation from a straight line of the sum of the momenta of a body [-].
+# _CANCELS: largest relative deviation from a straight line of the summed momenta of a body [-].
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # Largest relative decrease of the summed deviation that is treated as rounding error [-].
-# The limit prevents the search from endlessly adding and removing a part of almost no mass.
+# This limit prevents the search from endlessly adding and removing a part of almost no mass.
 _ROUNDED: Final = 1e-9
-# Largest final speed of parts at rest or held by a support, as a fraction of their largest momentum [-].
+# Largest final speed of parts at rest or held by a support, relative to their largest momentum [-].
 _HELD = 0.01
-# Largest relative difference between the summed part momenta and the momentum of the model, if no part is missing [-].
+# No part is missing if the part momenta add up to the momentum of the model within this relative error [-].
 _ALL_OF_IT: Final = 1e-2
-# _BY_ITSELF: smallest duration of a separate flight of a body that is considered, as a fraction of the record [-].
+# _BY_ITSELF: shortest separate flight of a body that is considered, as a fraction of the record [-].
 # _OF_ITS_OWN: smallest relative velocity difference between a body that flies separately and the other parts [-].
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
@@ -117,7 +117,7 @@ def _limit_to_flights_of_bodies(
 
 
 def find_bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
-    """Return the parts among ``members`` that fly separately at some time, with another velocity than the set."""
+    """Return the parts among ``members`` that fly separately at some time, with a different velocity from the set."""
     return _collect_bodies_apart(momenta, *members)
 
 
@@ -172,7 +172,7 @@ def _find_flights_of_part(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]
 def find_flight_of(
     momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None
 ) -> FreeFlight | None:
-    """Find the window around ``td`` in which the given parts together fly freely; None if there is none."""
+    """Find the window around ``td`` in which the given parts fly freely together; None if there is none."""
     time = momenta.time
     momentum = momenta.of(members)
     if time.size < FEWEST or not time[0] <= td <= time[-1]:
@@ -199,7 +199,7 @@ def find_flight_of(
     if states is None or (
         not gravity and gravities is None and _has_falling_part(momenta)
     ):
-        return None  # A part that does not fall while others fall is supported.
+        return None  # A part that does not fall while others do is supported.
     first, last = states
     inside = momentum[first : last + 1]
     if (
@@ -235,7 +235,7 @@ def _make_laws(
 
 @remember
 def _has_falling_part(momenta: Momenta) -> bool:
-    """Return True if the momentum of a single part shows that it falls under gravity."""
+    """Return True if the momentum of a single part shows that the part falls under gravity."""
     if momenta.parts is None:
         return False
     return any(get_laws_of(momenta, (i,)).fall for i in momenta.moving)
@@ -259,7 +259,7 @@ def can_deny_flight(momenta: Momenta) -> bool:
 
 
 def _has_clear_motion(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
-    """Return True if a constant momentum with error ``noise`` shows motion rather than rest of the chosen parts.
+    """Return True if a constant momentum with error ``noise`` shows that the chosen parts move rather than rest.
 
     Heavy parts print coarse numbers, which may hide a load on the chosen parts.  If the chosen parts have no mass, as
     springs, the members of the set count instead.
@@ -317,7 +317,7 @@ def _find_attached_parts(
         return ()
     wider = (
         len(moving) > rests.shape[1]
-    )  # The full set of left singular vectors is needed only if there are more parts than columns.
+    )  # The full set of left singular vectors is only needed if there are more parts than columns.
     left_vectors, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
@@ -334,7 +334,7 @@ def _find_attached_parts(
 def _refine_attached_parts(
     rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]
 ) -> tuple[int, ...]:
-    """Add or remove single parts as long as the summed deviation (parts, k) becomes smaller."""
+    """Add or remove single parts as long as this reduces the summed deviation (parts, k)."""
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
     while free:
@@ -429,7 +429,7 @@ def find_parts_flying_together(run: OpenedRun) -> tuple[Part, ...]:
 
 
 def _list_cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Yield the sets of parts attached to the heaviest part at different times, without the parts that then slide.
+    """Yield the sets of parts attached to the heaviest part at different times, without parts that slide at that time.
 
     A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
     body.
@@ -473,7 +473,7 @@ def _get_parts_and_momenta(run: OpenedRun) -> tuple[tuple[Part, ...], Momenta | 
 def _list_flights_of_bodies(
     momenta: Momenta, bodies: Iterable[Iterable[int]]
 ) -> Iterator[FreeFlight]:
-    """Yield the flights of bodies of connected parts, given by part ids."""
+    """Yield the flights of bodies that consist of connected parts, given by part ids."""
     position_by_id = {
         part.id: position for position, part in enumerate(momenta.parts or ())
     }
@@ -489,7 +489,7 @@ def _select_heaviest_parts(
     momenta: Momenta | None,
     found: Sequence[FreeFlight],
 ) -> tuple[Part, ...]:
-    """Return the deformable parts of the flight with the largest product of mass and time."""
+    """Return the deformable parts of the flight with the largest product of mass and duration."""
     if not found or momenta is None:
         raise FormatError(
             f"{run.name}: no momenta show which parts fly together; name the switched parts with `parts`"
@@ -521,7 +521,7 @@ def find_complete_stretches(
 def is_complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return True for each state in which the part momenta add up to the momentum of the whole model, shape (n,).
+    """Return True for each state at which the part momenta add up to the momentum of the whole model, shape (n,).
 
     ``before`` is the largest momentum of the whole model in earlier states.
     """

@@ -1,4 +1,4 @@
-"""Compute the position error of a body at td that is caused by moving parts frozen in another position.
+"""Compute the position error of a body at td that results from freezing its moving parts in a different position.
 
 A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
 flies as without switching, so the rest of the body is displaced by the part's fraction of the mass times the part's
@@ -38,16 +38,16 @@ if TYPE_CHECKING:
 
 # Largest number of states to which rotations are fitted. Displacements use all states.
 _STATES: Final = 200
-# Largest relative change of its relative velocity for a part that is not connected to the body [-].
-# The relative velocity of a connected part changes by more as soon as the body rotates by 0.01 degrees.
+# A part whose relative velocity changes by no more than this fraction is not connected to the body [-].
+# The relative velocity of a connected part changes by more than this once the body has rotated by 0.01 degrees.
 _STEADY: Final = 1e-4
-# Largest deformation of the other parts, relative to the part's motion, at which a position error is exact [-].
+# A position error is exact if the other parts deform by at most this fraction of the part's motion [-].
 # In computed cars with correct position errors, the deformation was at most 0.24 of the part's motion.
-# In a public car model with position errors that were 3 to 4 times too small, the deformation was 1.1 to 1.4 of it.
+# In a public car model with position errors 3 to 4 times too small, this ratio was 1.1 to 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
-# Largest negligible position error, even if underestimated, as a fraction of the largest acceptable error [-].
+# Largest position error that is negligible even if underestimated, relative to the largest acceptable error [-].
 _HARDLY: Final = 0.01
-# Largest acceptable position error as a fraction of the path of the body [-]; it is 1/3 of the margin before a contact.
+# Largest acceptable position error, relative to the path of the body [-]; it is 1/3 of the margin before a contact.
 MOST_OF_PATH: Final = 0.01
 
 
@@ -140,7 +140,7 @@ class Drift:
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
-        """Return the length of each vector (k, 3), or NaN for times outside the flight."""
+        """Return the length of each vector (k, 3), with NaN for times outside the flight."""
         inside = (
             (tr >= self.time[0])
             & (tr <= self.time[-1])
@@ -159,7 +159,7 @@ def find_drift(
     placement: Placement | None = None,
     displacements: Displacements | None = None,
 ) -> Drift | None:
-    """Find how a body in flight is displaced relative to the rigid body that replaces it.
+    """Find how far a body in flight is displaced relative to the rigid body that replaces it.
 
     The parts that move against the others are those without which the others are most nearly one rigid body turning at
     a constant rate; together they have at most half of the mass.
@@ -200,7 +200,7 @@ def find_drift(
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # Parts with unknown position are left out, because the error would otherwise be too small.
+    )  # Parts with unknown positions are left out; otherwise the error would be too small.
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(misfit / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -256,7 +256,7 @@ def find_drift_in_flight(
     parts: Sequence[Part] | None = None,
     placement: Placement | None = None,
 ) -> Drift | None:
-    """Find the displacement in a flight of the body that consists of ``parts``, or of the parts to be switched.
+    """Find the displacement, in a flight, of the body that consists of ``parts`` or of the parts to be switched.
 
     None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
     """
@@ -269,7 +269,7 @@ def find_drift_in_flight(
 def find_parts_apart(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the parts, among ``parts`` or the parts to be switched, that separate from the others in the flight.
+    """Return those of ``parts``, or of the parts to be switched, that separate from the others in the flight.
 
     The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
@@ -339,7 +339,7 @@ class RigidBody(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return the ids of the parts in the form that `parts` accepts."""
+        """Return the ids of the parts in the form accepted by `parts`."""
         return ",".join(map(str, self.parts))
 
 
@@ -358,7 +358,7 @@ class Off(NamedTuple):
 
     @property
     def part(self) -> str | None:
-        """Return the name of the part that is frozen in another position; None if there is none."""
+        """Return the name of the part that is frozen in a different position; None if there is none."""
         return self.drift.part.name if self.error > 0 else None
 
 
@@ -407,7 +407,7 @@ class Bodies:
 
     @property
     def limit(self) -> float:
-        """Return the largest acceptable position error, the smallest of all bodies with moving parts [length]."""
+        """Return the largest acceptable position error [length], the smallest one of all bodies with moving parts."""
         return min(
             (drift.limit for drift in self._known if drift.place.any()), default=np.inf
         )
@@ -423,7 +423,7 @@ class Bodies:
         return min(turning.compute_speed_at_front(direction) for turning in turnings)
 
     def worst(self, tr: float, td: float) -> Off | None:
-        """Return the most displaced body; None outside the flight, or if an error is unknown."""
+        """Return the most displaced body; None outside the flight or if an error is unknown."""
         if self._complete:
             errors = self._each(np.array([tr]), td)[:, 0]
         else:
@@ -451,7 +451,7 @@ def find_bodies_in_flight(
     told: Sequence[RigidBody] | None,
     placement: Placement | None = None,
 ) -> Bodies:
-    """Find the displacements of the bodies that the switched parts become in a flight.
+    """Find the displacements in a flight of the bodies that the switched parts become.
 
     Parameters
     ----------
@@ -494,7 +494,7 @@ def _find_drift_of_body(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Return the displacement of a body whose parts have energy; None if only a single part flies."""
+    """Return the displacement of a body, zero for a single part in flight; None if the energy of a part is unknown."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

@@ -21,28 +21,28 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# Largest fraction of the displacements that a rotation may leave unexplained to be accepted [-].
+# Largest fraction of the displacements that an accepted rotation may leave unexplained [-].
 _SHOWN: Final = 0.25
-# Largest number of Gauss-Newton steps; a dozen steps reach full precision from a good start.
+# Largest number of Gauss-Newton steps; from a good start, a dozen steps reach full precision.
 _MOST_STEPS: Final = 25
-# _SMALL: step of the numerical derivative by the angular velocity, in revolutions per record [-].
+# _SMALL: step of the numerical derivative with respect to the angular velocity [revolutions per record].
 # _LEAST_GAIN: relative change of the angular velocity or the fit below which the iteration stops [-].
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Sums of m r^2, about an axis or unexplained by a rotation, are treated as zero below this fraction of another [-].
+# A sum of m r^2, about an axis or left unexplained, is treated as zero below this fraction of the full sum [-].
 _VANISHING: Final = 1e-6
-# Numbers of periods per record that are tried as start values for the harmonic motion.
+# Numbers of periods per record that are tried as starting values for the harmonic motion.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 # Number of parts that each of two criteria selects as candidates for the next moving part.
 _TRIED: Final = 2
-# Largest ratio to which omitting the next moving part reduces the unexplained displacement [-].
+# Omitting the next moving part must reduce the unexplained displacement to at most this fraction [-].
 _MORE_RIGID: Final = 0.5
-# Largest motion of the other parts in a rotation that is ignored, relative to the moving part's motion [-].
+# A rotation that moves the other parts by at most this fraction of the motion of the moving part is ignored [-].
 _NOTABLE_WAY: Final = 0.1
-# Largest mass fraction of a single part at which the rotation of the body can be determined [-].
+# If one part has more than this fraction of the mass, the rotation of the body cannot be determined [-].
 _MOST_OF_BODY: Final = 0.95
-# Smallest mass fraction of the parts that are tried [-], because lighter parts hardly move the others.
+# Smallest mass fraction of the parts that are tried [-]; lighter parts hardly move the others.
 _HEAVY: Final = 0.05
 
 
@@ -168,7 +168,7 @@ def count_periods(time: Samples, left: Samples, rate: Samples) -> float:
 
 
 def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
-    """Return the sum of m r^2 of all parts but one about their common centre, for each omitted part, shape (parts,)."""
+    """Return, for each omitted part, the sum of m r^2 of all other parts about their common centre, shape (parts,)."""
     return np.asarray(
         _sum_without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
@@ -177,7 +177,7 @@ def _compute_least_displacements(ways: Samples, masses: Samples) -> Samples:
 
 
 def _estimate_least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    """Estimate the sum of m r^2 of all parts but one that no rotation explains, for each omitted part, shape (parts,).
+    """Estimate, for each omitted part, the sum of m r^2 of the other parts that no rotation explains, shape (parts,).
 
     In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
     integrals: linear in the rate, with normal equations from which one part is easily removed.
@@ -220,7 +220,7 @@ def _list_linear_terms(
 def _compute_rest(
     time: Samples, ways: Samples, rate: Samples, weights: Samples
 ) -> Samples:
-    """Return the sum of m r^2 that a rotation at the angular velocity ``rate`` does not explain."""
+    """Return the sum of m r^2 that a rotation at the angular velocity ``rate`` leaves unexplained."""
     return np.asarray(weights * subtract_circles(time, ways, rate))
 
 
@@ -231,7 +231,7 @@ def _rotate_frame(time: Samples, rate: Samples) -> Samples:
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
     # The product ``across @ v`` is the cross product of the axis and v.
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # Rodrigues' formula.
+    # This is Rodrigues' formula.
     odd = np.sin(angle) * across
     even = (1 - np.cos(angle)) * (across @ across)
     return np.asarray(np.eye(3) + odd + even)
@@ -300,7 +300,7 @@ def _find_next_moving_part(
 def _leave_part_out(
     time: Samples, ways: Samples, mass: Samples, left: Places, part: int
 ) -> _Apart:
-    """Leave one part out, and fit the rotation of the others."""
+    """Omit one part, and fit the rotation of the others."""
     remaining = left[left != part]
     path_of_part = (
         ways[:, [part]]
@@ -326,12 +326,12 @@ def _leave_part_out(
 
 
 def _subtract_centre(ways: Samples, mass: Samples) -> Samples:
-    """Return displacements relative to the centre of mass."""
+    """Return the displacements relative to the centre of mass."""
     return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
 
 
 def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
-    """Return True if the other parts have half of the mass, and no part has almost all of it."""
+    """Return True if the other parts have at least half of the mass, and no part has almost all of it."""
     remaining_mass = mass[left[left != part]]
     return bool(
         2 * remaining_mass.sum() >= mass.sum()
@@ -340,7 +340,7 @@ def _can_leave_out(mass: Samples, left: Places, part: int) -> bool:
 
 
 def has_clear_rotation(mass: Samples) -> bool:
-    """Return True if the rotation of the body is still found when any one of its heavy parts is omitted."""
+    """Return True if the rotation of the body is still found after omitting any one of its heavy parts."""
     if mass.size < 3:
         return False
     columns = np.arange(mass.size)

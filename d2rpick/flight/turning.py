@@ -1,4 +1,4 @@
-"""Compute how a body that is rigid from tr to td rotates away from the deformable body of the reference run.
+"""Compute how a body that is rigid from tr to td rotates relative to the deformable body of the reference run.
 
 Both keep their angular momentum L.  In the frame of the body, with the places y of its parts about the centre of mass
 of all that flies, the tensor of inertia I and w = I^-1 L,
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from d2rpick.flight.body_frame import Displacements, Frame
     from d2rpick.histories.history import Momenta, Samples
 
-# Largest number of states in the integration, which suffices because vibration hardly rotates a body.
+# Largest number of states in the integration; they suffice, because vibration hardly rotates a body.
 _STATES: Final = 2000
-# Inverse of the fraction of the flight over which the final angular velocity is averaged, to remove vibration [-].
+# Inverse of the fraction of the flight over which the final angular velocity is averaged to remove vibration [-].
 _LAST: Final = 10
 
 
@@ -68,7 +68,7 @@ class Turning(NamedTuple):
     rate: Samples
 
     def compute_speed_at_front(self, direction: Samples) -> float:
-        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along the vector.
+        """Return the speed along a unit vector (3,) that the rotation gives to the node farthest along this vector.
 
         That node touches a plane ahead first, at the last time; its whole speed is that of the centre of mass and this
         one [length/time].
@@ -77,7 +77,7 @@ class Turning(NamedTuple):
         return float(np.cross(self.rate, front) @ direction)
 
     def errors_at_front(self, tr: Samples, direction: Samples) -> Samples:
-        """Return the position error at the last time of the node that is then farthest along a unit vector (3,).
+        """Return the position error, at the last time, of the node that is then farthest along a unit vector (3,).
 
         The body is rigid from ``tr`` (k,) to the last time; the result has shape (k,) [length].
         """
@@ -88,11 +88,11 @@ class Turning(NamedTuple):
         return np.asarray(np.linalg.norm(moved, axis=1))
 
     def _find_front(self, direction: Samples) -> Samples:
-        """Return the coordinates (3,) of the node that lies farthest in a given direction, a unit vector [length]."""
+        """Return the coordinates (3,) of the node that lies farthest in the direction of a unit vector [length]."""
         return np.asarray(self.nodes[int(np.argmax(self.nodes @ direction))])
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """Return the rotation errors psi at td of a body that is rigid since ``tr`` (k,), shape (k, 3) [rad]."""
+        """Return the rotation errors psi at td of a body that has been rigid since ``tr`` (k,), shape (k, 3) [rad]."""
         pushed, kept_turn = (
             _interpolate_at(self.time, turn, np.array([td]))
             - _interpolate_at(self.time, turn, tr)
@@ -106,14 +106,14 @@ class Turning(NamedTuple):
         )
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) of a body that is rigid since ``tr`` (k,), in the body frame [length]."""
+        """Return the displacements (k, 3) of a body that is rigid from ``tr`` (k,) on, in the body frame [length]."""
         arm = _interpolate_at(self.time, self.arm, np.array([td]))
         return np.asarray(
             self._compute_slides(tr, td) + np.cross(self.angles(tr, td), arm)
         )
 
     def _compute_slides(self, tr: Samples, td: float) -> Samples:
-        """Return the displacements (k, 3) from ``tr`` to td without the part due to rotation, in the body frame."""
+        """Return the displacements (k, 3) from ``tr`` to td [length], without rotation, in the body frame."""
         at_td = _interpolate_at(self.time, self.place, np.array([td]))
         return np.asarray(at_td - _interpolate_at(self.time, self.place, tr))
 
@@ -134,7 +134,7 @@ class Flying(NamedTuple):
 
 
 class _FlyingParts(NamedTuple):
-    """Flying parts whose mass and place in the deck are known.
+    """Flying parts whose masses and positions in the deck are known.
 
     ``columns`` are their columns in the momenta; ``masses`` (parts,), ``centres`` (parts, 3) [length] and ``spreads``
     (parts, 3, 3), the second moments of a unit mass about the centre [length^2], have the same order.
@@ -146,12 +146,12 @@ class _FlyingParts(NamedTuple):
     spreads: Samples
 
     def find_rows(self, columns: Sequence[int]) -> list[int]:
-        """Return the positions of columns of the momenta in the arrays of these parts."""
+        """Return the rows of these parts' arrays that belong to the given columns of the momenta."""
         rows = {column: row for row, column in enumerate(self.columns)}
         return [rows[column] for column in columns]
 
 
-class _Motion(NamedTuple):
+class _BodyMotion(NamedTuple):
     """Motion of the flying parts at times ``time`` (n,): the ``frame`` of the body, and ``places`` (n, parts, 3) in it.
 
     The places are relative to the centre of mass of all that flies [length].
@@ -163,7 +163,7 @@ class _Motion(NamedTuple):
 
 
 class _Rotor(NamedTuple):
-    """What rotates, in the frame of the body: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) from state to state.
+    """The rotating parts in the frame of the body: ``inertia`` (n, 3, 3), and ``spin`` (n - 1, 3) between states.
 
     The spin is the angular momentum in this frame, integrated over each step.
     """
@@ -178,7 +178,7 @@ def follow_turning(
     placement: Placement,
     displacements: Displacements | None = None,
 ) -> Turning | None:
-    """Follow the orientation of the body of given parts, from the deck positions of all flying parts.
+    """Follow the orientation of the body formed by the given parts, from the deck positions of all flying parts.
 
     ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, or
     neither the parts of the body nor nodes whose ``displacements`` are written determine its orientation.
@@ -208,7 +208,7 @@ def follow_turning(
     )
     carried, pushed, kept = _solve_turning(time, frame.axes, everything, rigid)
 
-    # The centre of the parts that define the frame, in the frame and in the deck.
+    # The centre of the parts that define the frame is needed both in the frame and in the deck.
     frame_rows = flying.find_rows(frame_columns)
     frame_centre = _weigh_by_mass(places[:, frame_rows], masses[frame_rows])
     deck_centre = _weigh_by_mass(flying.centres[frame_rows], masses[frame_rows])
@@ -244,7 +244,7 @@ def _follow_parts(
     frame_columns: Sequence[int],
     placement: Placement,
     displacements: Displacements | None,
-) -> _Motion | None:
+) -> _BodyMotion | None:
     """Follow the frame of the body and the flying parts in it; None if nothing determines the frame."""
     momenta = seen.momenta
     assert momenta.parts is not None
@@ -256,7 +256,7 @@ def _follow_parts(
     time = momenta.time[inside][::stride]
     travel = _integrate_velocities(momenta, flying.columns, masses)[inside][::stride]
 
-    # If the record begins with the run, the parts have moved by their travel from where the deck puts them.
+    # If the record begins with the run, the parts start at their positions in the deck and have moved by their travel.
     frame = None
     begins_with_run = momenta.time[0] <= momenta.time[1] - momenta.time[0]
     positions = flying.centres + travel
@@ -272,11 +272,11 @@ def _follow_parts(
         positions = _place_by_frames(flying.centres, travel, frame.axes)
     centre_of_mass = _weigh_by_mass(positions, masses)
     places = (positions - centre_of_mass[:, np.newaxis]) @ frame.axes
-    return _Motion(time, frame, places)
+    return _BodyMotion(time, frame, places)
 
 
 def _locate_flying_parts(seen: Flying, placement: Placement) -> _FlyingParts | None:
-    """Look up the parts with a mass in the deck; None if a mass is unknown, or a part is not in the deck."""
+    """Find the parts that have a mass in the deck; None if a mass is unknown or a part is not in the deck."""
     momenta = seen.momenta
     assert momenta.parts is not None
     columns = sorted(
@@ -309,7 +309,7 @@ def _integrate_velocities(
 
 
 def _place_by_frames(centre: Samples, since: Samples, frames: Samples) -> Samples:
-    """Return the positions (n, parts, 3) of parts in a record within the run, up to a common displacement.
+    """Return the positions of parts during a section of the run, up to a common displacement, shape (n, parts, 3).
 
     Their motion ``since`` (n, parts, 3) is known.  In the mean over the flight each part is where the deck puts it in
     the frame of the body: a part that vibrates on its mounts does so about its place.
@@ -328,7 +328,7 @@ def _compute_last_rate(time: Samples, frames: Samples) -> Samples:
 def _solve_turning(
     time: Samples, frames: Samples, everything: _Rotor, rigid: _Rotor
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of the rotation error psi; return propagation matrix, particular solution, inertia effect.
+    """Solve the equation of the rotation error psi; return propagation matrix, particular solution and inertia effect.
 
     ``frames`` (n, 3, 3) are those of the body, ``everything`` is all that flies and ``rigid`` the parts that become
     rigid.
@@ -377,9 +377,9 @@ def _integrate_matrix(time: Samples, slope: Samples) -> Samples:
 
 
 def _compute_turns(frames: Samples) -> Samples:
-    """Return the rotation from each frame to the next, shape (n - 1, 3) [rad], for small angles."""
+    """Return the rotation from each frame to the next, for small angles, shape (n - 1, 3) [rad]."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
-    # The odd part of a rotation matrix holds its axis times the sine of its angle.
+    # The odd part of a rotation matrix contains the rotation axis times the sine of the angle.
     odd = (between - between.transpose(0, 2, 1)) / 2
     sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
     size = np.linalg.norm(sine, axis=1, keepdims=True)
@@ -405,12 +405,12 @@ def _make_cross_matrices(vectors: Samples) -> Samples:
 
 
 def _take_middle_values(values: Samples) -> Samples:
-    """Return the mean of the values at both ends of each step."""
+    """Return the mean of the values at the two ends of each step."""
     return np.asarray((values[1:] + values[:-1]) / 2)
 
 
 def _sum_running(steps: Samples) -> Samples:
-    """Return the running sum over steps, which starts at 0."""
+    """Return the running sum over the steps, starting at 0."""
     return np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
 
 

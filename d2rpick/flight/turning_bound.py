@@ -1,4 +1,4 @@
-"""Bound the speed that rotation may add at the point of contact, if no file shows how the body rotates.
+"""Bound the speed that rotation may add at the point of contact if no file shows how the body rotates.
 
 The kinetic energy of a body less that of its centre of mass is the energy of its vibration and of its rotation, and
 the latter is the same in all states of a flight.  Its least value therefore bounds the rotation.
@@ -85,7 +85,7 @@ def _bound_energy_of_rotation(history: History, flight: Flight) -> float | None:
 def _compute_largest_factor(
     placement: Placement, parts: list[int], mass: Samples
 ) -> float:
-    """Return the largest (r x n) I^-1 (r x n) over all nodes r of some parts and all unit vectors n [1/mass]."""
+    """Return the largest (r x n) I^-1 (r x n) over all nodes r of the given parts and all unit vectors n [1/mass]."""
     centres = np.stack([placement.parts[part].centre for part in parts])
     spreads = np.stack([placement.parts[part].spread for part in parts])
     home = np.average(centres, axis=0, weights=mass)
@@ -95,7 +95,7 @@ def _compute_largest_factor(
     inverse_inertia = np.linalg.pinv(inertia, hermitian=True)
     arms = placement.find_nodes(parts) - home
     crossed = np.cross(arms[:, np.newaxis], np.eye(3))
-    # The largest factor of a node over all directions is the largest eigenvalue of its matrix.
+    # For each node, the maximum over all n is the largest eigenvalue of the matrix of the quadratic form in n.
     matrices = np.einsum("nai,ij,nbj->nab", crossed, inverse_inertia, crossed)
     factors = np.linalg.eigvalsh(matrices)
     return float(factors[:, -1].max())

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Smallest energy variation of other vibrating parts, as a fraction of the energy range of the chosen parts [-].
+# Smallest energy variation of other vibrating parts, relative to the energy range of the chosen parts [-].
 _HARDLY: Final = 0.02
 # Smallest number of states from which a fall and a vibration can be separated.
 _FEWEST: Final = 16
 
 
 class Beside(NamedTuple):
-    """Parts that vibrate with the chosen ones but were not chosen; ``energy`` is the range of their energy [energy]."""
+    """Parts that vibrate with the chosen parts but were not chosen; ``energy`` is their energy range [energy]."""
 
     parts: tuple[Part, ...] = ()
     energy: float = 0.0

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# Initial tolerance for deviations from free flight, as a fraction of the range over the record [-].
+# Initial tolerance for deviations from free flight, relative to the range over the record [-].
 # A contact exceeds the initial tolerance at once.
 TOLERANCE = 1e-3
-# _TIGHTER: factor by which the tolerance is repeatedly reduced while the window keeps its length [-].
+# _TIGHTER: factor by which the tolerance is repeatedly reduced as long as the window keeps its length [-].
 # With a smaller tolerance, windows of other smooth motions shrink to less than half, but windows of flights do not.
-# _STAYS: smallest fraction of its length that a window retains if it is treated as unchanged [-].
-# _STANDS: largest shift of the unchanged end of a window that shrinks at its other end, as a fraction of it [-].
+# _STAYS: a window that retains at least this fraction of its length is treated as unchanged [-].
+# _STANDS: largest shift of the other end of a window that shrinks at one end only, relative to the window [-].
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# Smallest misfit of a vibration in the middle half of a window, as a fraction of the misfit in the whole window [-].
+# Smallest misfit of a vibration in the middle half of a window, relative to the misfit in the whole window [-].
 # For a smooth load, the misfit in the middle half of a window is 1/8 of that in the whole window.
 _RINGS = 1 / 3
 # SHORTEST: smallest duration of a flight, as a fraction of the record [-].
@@ -32,24 +32,24 @@ _RINGS = 1 / 3
 SHORTEST, FEWEST = 0.05, 12
 # Smallest number of states from which a load, gravity and damping can be separated; twice the number of unknowns.
 FEWEST_STATES_OF_WORK: Final = 6
-# _ENDS: fraction of a window at each end that is not used to determine the misfit of the free flight itself [-].
-# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may be larger if the ends are included [-].
-# _REACH: factor by which any other misfit may be larger if the ends are included [-].
+# _ENDS: fraction of a window that is excluded at each end when the misfit inside the flight is determined [-].
+# _REACH_OF_DIGITS: factor by which a misfit due to printed digits may grow if the ends are included [-].
+# _REACH: factor by which any other misfit may grow if the ends are included [-].
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
-# Relative resolution of any quantity [-], because solvers sum in single precision.
+# Relative resolution of all quantities [-]; solvers sum in single precision.
 ROUND_OFF = 1e-7
-# Largest relative change of a value of a file that is treated as rounding [-]; files have six to seven digits.
+# Largest relative change of a written value that is treated as rounding [-]; files have six to seven digits.
 LAST_DIGIT: Final = 1e-6
-# Smallest ratio of a momentum, an energy or its change to its rounding error at which it shows motion or work [-].
+# Smallest momentum, energy or change of either that shows motion or work, relative to its rounding error [-].
 VISIBLE: Final = 100
-# Step in the list of start times that find all flights, for a search that only needs to find long flights.
+# Step in the list of start times that find all flights, for a search that only has to find long flights.
 _FAR: Final = 5
 # Largest number of times that the ends of one window are cut off.
 _MOST_SHRINKS = 8
 
 
 class FreeFlight(NamedTuple):
-    """A window [time] in which ``parts`` fly freely together; None stands for the whole model.
+    """A window in which ``parts`` fly freely together [time]; None stands for the whole model.
 
     ``end_seen`` is False if the record ends during the flight.  ``damping`` is alpha, the decay rate of the momentum
     [1/time].  ``gravity`` is the acceleration taken as gravity: 0 if there is none, NaN if nothing but its constancy
@@ -68,7 +68,7 @@ class FreeFlight(NamedTuple):
         cls, time: Samples, states: tuple[int, int], parts: tuple[Part, ...] | None = None, *,
         damping: float = 0.0, gravity: float = 0.0,
     ) -> FreeFlight:  # fmt: skip
-        """Make the flight from the first to the last of given states of a record."""
+        """Make the flight from the first to the last of the given states of a record."""
         first, last = states
         return cls(
             float(time[first]),
@@ -103,13 +103,13 @@ class Law:
 
 
 class Constant(Law):
-    """Quantities (n, k) that do not change; the misfit is half the largest range [unit of the values]."""
+    """Quantities (n, k) that do not change; the misfit is half of the largest range [unit of the values]."""
 
     def __init__(self, time: Samples, values: Samples) -> None:
         super().__init__(time)
         self.values = np.asfortranarray(
             values
-        )  # Columns that are contiguous in memory are faster to process.
+        )  # Columns that are contiguous in memory can be processed faster.
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -125,7 +125,7 @@ def find_lasting_window(
     enough: float = 0.0,
     rings: bool = False,
 ) -> tuple[int, int] | None:
-    """Find the states around ``td`` that obey the law and keep obeying it when the tolerance is made stricter.
+    """Find the states around ``td`` that obey the law, and still obey it with a tighter tolerance.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def find_lasting_window(
     window, room, from_start = states
     first, last = _tighten_window(law, window, rounding, room)
     if first == 1 and from_start:
-        first = 0  # The solver may write the first state before its first step, with earlier velocities.
+        first = 0  # The solver may write the first state before the first step, with earlier velocities.
     if time[first] <= td <= time[last] and _is_long_enough(time, (first, last)):
         return (first, last)
     return None
@@ -257,12 +257,12 @@ def find_longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
 
 
 def list_moments(time: Samples) -> Iterator[float]:
-    """Yield times so close together that each flight of sufficient length contains one of them."""
+    """Yield times that are so close together that each sufficiently long flight contains one of them."""
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
 
 
 def list_marks(time: Samples, td: float) -> Iterator[float]:
-    """Yield the start times of the search for the flight around ``td``; many td share them.
+    """Yield the start times of the search for the flight around ``td``, which many td share.
 
     First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
     """
@@ -279,7 +279,7 @@ def find_all_windows(
     for moment in list_moments(time):
         if not flights or moment > flights[-1].end:
             flight = around(moment)
-            if flight:  # Because of the tolerance, flights may overlap by a few states.
+            if flight:  # Flights may overlap by a few states because of the tolerance.
                 flights.append(
                     flight._replace(start=max(flight.start, flights[-1].end))
                     if flights
@@ -349,7 +349,7 @@ def _measure_length(time: Samples, window: tuple[int, int]) -> float:
 
 
 def find_farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
-    """Find the farthest index from ``start`` towards ``limit`` that fits, by doubling and bisecting the step."""
+    """Find the farthest index from ``start`` towards ``limit`` that fits, by doubling and then halving the step."""
     sign = 1 if limit > start else -1
     good = start
     step = 1
@@ -373,7 +373,7 @@ def limit_to_unheld(
     parts: Sequence[Part] | None,
     td: float,
 ) -> FreeFlight | None:
-    """Return the part of a flight around ``td`` [time] in which no support holds the parts or the model."""
+    """Return the part of a flight around ``td`` in which no support holds the parts or the model [time]."""
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None

@@ -1,4 +1,4 @@
-"""Find free flight in the energies of the model: only gravity and mass-proportional damping do work.
+"""Find free flight in the energies of the model; only gravity and mass-proportional damping do work in it.
 
 With the resultant F of gravity, the momentum p and the mass m, gravity does the work int F p/m dt; such damping does -2
 alpha int K dt, which Radioss counts as external work.  While nothing touches, the contact energy is constant.
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# Relative error of the work of gravity, caused by sampling and by the sums of the solver [-].
+# Relative error of the work of gravity, caused by sampling and by the solver's sums [-].
 # Contacts are found because they change the energies by more than this fraction of the work of gravity.
 _OWN_ERROR: Final = 1e-3
-# Relative deviation of the work of gravity from a parabola that is attributed to damping [-].
+# If the work of gravity deviates from a parabola by at most this fraction, damping may be the reason [-].
 _BENT: Final = 1e-2
-# Smallest squared speed of states that are used to compute the mass, as a fraction of the largest [-].
+# Smallest squared speed of states that are used to compute the mass, relative to the largest [-].
 _SLOW: Final = 1e-2
-# Safety factor on the mass that is computed from kinetic energy and velocity [-].
-# The mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
+# Safety factor on the mass computed from kinetic energy and velocity [-].
+# That mass may be too small, because a table may contain the kinetic energy of only the chosen parts.
 # A load that does work like gravity without moving the model would need a much larger mass.
 _MASS_ERROR: Final = 2.0
-# Largest deviation that shows no work, as a fraction of the range of the internal energy [-].
+# Largest deviation that is treated as no work, relative to the range of the internal energy [-].
 _OF_INTERNAL: Final = 0.1
-# Error of a sum of energies minus the work of gravity, in multiples of the relative rounding error of a number [-].
+# Error of a sum of energies minus the work of gravity, in relative rounding errors of one number [-].
 # Energies, momenta and the mass computed from them are all rounded.
 _OF_DIGITS: Final = 4
 # _LITTLE: largest relative loss of kinetic energy that is ignored [-].
-# _MUCH: smallest relative loss of kinetic energy that is due to friction instead of damping [-].
+# _MUCH: a relative loss of kinetic energy of at least this is attributed to friction instead of damping [-].
 _LITTLE, _MUCH = 5e-3, 0.5
 
 # Relative error of the damped energy if it is computed from the damping rate of the vibration [-].
@@ -122,7 +122,7 @@ class _ExternalWork(Law):
 def _measure_unexplained_work(
     balance: Balance, external_work: Samples, inside: slice
 ) -> float:
-    """Return the largest external work in some states that neither gravity nor damping explains [energy]."""
+    """Return the largest external work in the given states that neither gravity nor damping explains [energy]."""
     time = balance.time[inside]
     work = external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])
@@ -184,7 +184,7 @@ def _fit_one_sided(
 def _fit_not_negative(
     values: Samples, free: Sequence[Samples], used: Sequence[Samples]
 ) -> tuple[Samples, Samples]:
-    """Fit the columns ``used`` to ``values``: return the residual and the non-negative factors."""
+    """Fit the columns ``used`` to ``values``; return the residual and the non-negative factors."""
     used_columns = list(range(len(used)))
     while True:
         table = np.stack([*free, *(used[i] for i in used_columns)], axis=1)
@@ -197,7 +197,7 @@ def _fit_not_negative(
 
 
 def has_laws(balance: Balance) -> bool:
-    """Return True if the record contains work or an energy that obeys a law in free flight."""
+    """Return True if the record contains work, or an energy that obeys a law in free flight."""
     return balance.time.size >= FEWEST and bool(_list_terms(balance))
 
 
@@ -225,7 +225,7 @@ def compute_change_of_balance(
 
 @remember
 def _make_laws_of_work(balance: Balance) -> tuple[_Parabola, _Parabola]:
-    """Return two laws of the energies in free flight; the second allows for a vibration of the internal energy."""
+    """Return two laws of the energies in free flight; the second allows the internal energy to vibrate."""
     terms = np.stack(_list_terms(balance), axis=1)
     return (
         _Parabola(balance.time, terms, balance.kinetic, None),
@@ -362,7 +362,7 @@ def is_taken_by_damping(
 
 
 def _classify_gravity(balance: Balance, first: int, last: int) -> float:
-    """Return gravity in a window: 0 if the energies are constant or only damped, otherwise unknown.
+    """Return the gravity in a window: 0 if the energies are constant or only damped, otherwise unknown.
 
     NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
     shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
@@ -399,7 +399,7 @@ def _classify_gravity(balance: Balance, first: int, last: int) -> float:
 
 
 def _list_terms(balance: Balance) -> list[Samples]:
-    """Return the written energies that nothing but gravity and damping changes in free flight."""
+    """Return the written energies that only gravity and damping change in free flight."""
     whole = balance.kinetic_and_internal
     internal = balance.internal
     changes = (
@@ -415,7 +415,7 @@ def _list_terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Law that energies are parabolas of time, apart from damping, which takes a fraction of the kinetic energy.
+    """Law that energies are parabolas over time, apart from damping, which removes a fraction of the kinetic energy.
 
     Solvers compute velocities half a step away from positions, which adds the rate of the ``internal`` energy.
     """
@@ -449,14 +449,14 @@ class _Parabola(Law):
         )
         scale = 2.0 ** (
             np.frexp(np.abs(self.energies[states]).max())[1] - 1
-        )  # The scale is a power of 2, so that scaling is exact.
+        )  # The scale is a power of two, so that scaling is exact.
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)
 
 
 def has_visible_contacts(balance: Balance) -> bool:
-    """Return True if the contact energy shows that a contact of the model was closed at some time."""
+    """Return True if the contact energy shows that a contact of the model was closed at any time."""
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
         return False
@@ -471,7 +471,7 @@ def _make_law_of_contacts(balance: Balance) -> Constant:
 
 
 def find_plateau(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which the contact energy is constant; None if there is none.
+    """Find the window around ``td`` in which the contact energy is constant [time]; None if there is none.
 
     If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
     counts only if the external work, which shows that load, is written too.

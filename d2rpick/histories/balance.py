@@ -1,4 +1,4 @@
-"""Read the energy balance of a run; the names of the energies depend on the solver."""
+"""Read the energy balance of a run from energies whose names depend on the solver."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "eroded": "eroded_internal_energy",
     "damping": "damping_energy",
 }
-# Names of a total energy in Abaqus: the sum of all energies minus the external work, which is constant.
+# Names that Abaqus uses for a total energy: the sum of all energies minus the external work, which is constant.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # The health of a run can be judged if the files contain at least one of these quantities.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {
@@ -54,14 +54,14 @@ _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 # Normalised names of the spring energy in Radioss, in LS-DYNA's glstat, and in the glstat branch of a binout.
 # Spring energies are recognised in solver files only, because in tables these names may have another meaning.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Largest spring energy that is treated as zero, as a fraction of the peak internal energy [-].
-# The limit for spring energies corresponds to the six to seven digits of a glstat and of single precision.
+# Largest spring energy that is treated as zero, relative to the peak internal energy [-].
+# This limit corresponds to the six to seven significant digits of a glstat and of single precision.
 _NONE: Final = 1e-6
 # Largest spring energy that is treated as zero [energy]; LS-DYNA prints 1e-20 for zero.
 _FLOOR: Final = 1e-15
-# Tolerance of the sum of the part spring energies, as a fraction of its peak [-]; matsum prints five digits.
+# Largest deviation of the summed spring energies of the parts, relative to the peak [-]; matsum prints five digits.
 _ADDS_UP: Final = 1e-3
-# Smallest fitted factor at which the energy of a part belongs to the sum [-]; ideal factors are 0 and 1.
+# A part is included in the sum if its fitted factor is larger than this [-]; the ideal factors are 0 and 1.
 _HALF: Final = 0.5
 
 
@@ -88,7 +88,7 @@ def read_balance(
 
 
 def read_terms(databases: Sequence[Legs]) -> Balance | None:
-    """Return the energy balance of the whole model, even if it is too incomplete for judging the run.
+    """Return the energy balance of the whole model, even if it is too incomplete to judge the run.
 
     The result is None if the files have no energy but the internal one, or if the columns are ambiguous.
     """
@@ -109,7 +109,7 @@ def read_momentum(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    # The mass is unknown if no file contains it, or if nothing moves.
+    # The mass stays unknown if no file contains it, or if nothing moves.
     mass = float("nan")
     if columns.momentum:
         mass = columns.mass(values) or mass
@@ -139,7 +139,7 @@ def _find_whole_model(databases: Sequence[Legs]) -> Legs | None:
 
 
 def _read_terms_until(whole: Legs, until: float) -> Balance | None:
-    """Return the energies of the balance up to a time; None if the time or the columns cannot be read."""
+    """Return the energies of the balance up to a time, or None if the time or the columns cannot be read."""
     columns = give_if_written(
         lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     )
@@ -173,7 +173,7 @@ def _find_global_velocities(database: Legs) -> dict[str, str]:
 
 
 class _Columns:
-    """The columns of a database keyed by the quantities that they contain, for the first ``states`` states.
+    """The columns of a database for its first ``states`` states, keyed by quantity.
 
     A column that is missing, or not in every state, is None.
     """
@@ -186,7 +186,7 @@ class _Columns:
         self.momentum = False
 
     def mass(self, momenta: Samples) -> float:
-        """Return the mass of the model as written, or else the smallest mass possible for these momenta (n, 1, 3)."""
+        """Return the mass of the model in the file; without it, the smallest mass that fits these momenta (n, 1, 3)."""
         written = self.quantity("mass")
         kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
@@ -213,7 +213,7 @@ class _Columns:
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
-        """Return the velocity of the centre of mass, shape (n, 3), possibly scaled by an unknown constant factor.
+        """Return the velocity of the centre of mass, shape (n, 3), possibly multiplied by an unknown constant.
 
         A global velocity is preferred, then a momentum, then any other velocity. A planar one has two of the three
         components.
@@ -261,7 +261,7 @@ def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
 def _read_hourglass_energies(
     databases: Sequence[Legs], parts: Sequence[Part], until: float
 ) -> tuple[tuple[Part, float, float], ...]:
-    """Return the highest hourglass energy and internal energy of each part for which the files contain both."""
+    """Return the highest hourglass energy and the highest internal energy of each part that has both in the files."""
     ids = [part.id for part in parts]
     for database in databases:
         try:
@@ -281,7 +281,7 @@ def _read_hourglass_energies(
 
 
 def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
-    """Return name and values (n,) of the spring and damper energy; None if it is zero or makes up all of the energy."""
+    """Return the name and values (n,) of the spring and damper energy; None if it is zero or is the only energy."""
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
@@ -309,7 +309,7 @@ def find_spring_energy(database: Legs) -> tuple[str, Samples] | None:
 def find_springs(
     databases: Sequence[Legs], parts: Sequence[Part], energies: Samples, time: Samples
 ) -> tuple[Part, ...]:
-    """Return the parts whose energies add up to the energy of springs and dampers; empty if there are no such parts.
+    """Return the parts whose energies add up to the spring and damper energy; empty if there are none.
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """

@@ -1,4 +1,4 @@
-"""Read the forces of contacts and rigid walls, and the intervals between states in which they act.
+"""Read contact and rigid-wall forces, and the intervals between states in which these forces act.
 
 A solver writes exactly zero if nothing touches. LS-DYNA writes forces at each state; Radioss writes their impulses
 since the start, which do not change while no force acts, and miss no force.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Largest force or impulse change that is treated as zero, as a fraction of the largest value [-].
+# Largest force or impulse change that is treated as zero, relative to the largest value [-].
 # Single precision has seven digits, so forces below this fraction are rounding errors.
 _NOTHING: Final = 1e-6
 
@@ -68,7 +68,7 @@ class ContactForce(NamedTuple):
 
     @property
     def times(self) -> tuple[tuple[float, float], ...]:
-        """Intervals (start, end) in which the force acts; each interval is bounded by two states without force."""
+        """Intervals (start, end) in which the force acts; each interval lies between two states without force."""
         return tuple(
             (
                 float(self.time[max(interval.start - 1, 0)]),
@@ -79,14 +79,14 @@ class ContactForce(NamedTuple):
 
     @property
     def tells(self) -> bool:
-        """True if the force acts at some times, but not at all times."""
+        """True if the force acts at some times and does not act at others."""
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
 def find_force(
     forces: Sequence[ContactForce], kind: str, number: int
 ) -> ContactForce | None:
-    """Return the force of the contact, interface or rigid wall with a given number; None if the files lack it."""
+    """Return the force of the contact, interface or rigid wall with this number; None if the files lack this force."""
     head = f"{kind} {number}"
     return next(
         (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     Addresses = NDArray[np.int64]
 
 _HELD: Final = 1 << 24  # Largest size of a file that is kept in memory [bytes].
-_LINES: Final = 1 << 16  # Number of bytes in which line ends are counted at once.
-# Number of bytes at each end of a file that are compared to recognise the file after it has grown.
+_LINES: Final = 1 << 16  # Number of bytes in which line endings are counted at a time.
+# Number of bytes at each end of a file that are compared to recognise a file that has grown.
 _END: Final = 1 << 12
 
 
@@ -70,7 +70,7 @@ class Content:
         return _gather_fields(self.view(0, len(self)), addresses, width)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and at every ``stride`` bytes after it.
+        """Fill the rows of ``room`` (n, width) with the bytes at ``begin`` and at steps of ``stride`` bytes after it.
 
         Return the ``rest`` bytes after the last stride, fewer if the file ends before.
         """
@@ -91,7 +91,7 @@ def make_content(data: bytes | Content) -> Content:
 
 
 class OnDisk(Content):
-    """The bytes of a file, which are read from disk at each request.
+    """The bytes of a file, read from disk at each request.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ class OnDisk(Content):
         State of the file when no write is pending.
     """
 
-    # Number of bytes that are read at once for a request of many bytes.
-    # This number is a power of 2 that fits into the processor's cache.
+    # Number of bytes that are read at a time for a large request.
+    # The number is a power of two that fits into the processor cache.
     block = 1 << 19
-    # Largest gap between two fields that are read together [bytes]; reading a larger gap costs more than a system call.
+    # Largest gap between two fields that are read together [bytes]; skipping a larger gap is worth a system call.
     gap = 1 << 13
-    # Smallest number of bytes read at a time, because the next request is usually for the bytes that follow.
+    # Smallest number of bytes read at a time; the next request is usually for the bytes that follow.
     window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
@@ -194,7 +194,7 @@ class OnDisk(Content):
         return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
-        """Read fields at ascending offsets; fields that are close together are read at once."""
+        """Read fields at ascending offsets; fields that lie close together are read in one call."""
         fields = np.empty((addresses.size, width), np.uint8)
         if not addresses.size:
             return fields
@@ -248,17 +248,17 @@ class OnDisk(Content):
         )
 
     def check(self) -> None:
-        """Raise ChangedError unless everything read so far belongs to one snapshot of the file."""
+        """Raise ChangedError unless all bytes read so far belong to one snapshot of the file."""
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
         if now.size == self._size and now.modified != self._state.modified:
-            # A write may be in progress, because a write changes the modification time first and the size last.
+            # A write may still be in progress, because it changes the modification time first and the size last.
             wait_for_settled_state(self._file, may_grow=True)
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        # True if the file has grown or was renamed, in which case its earlier bytes may be unchanged.
+        # True if the file has grown or was renamed; its earlier bytes may then be unchanged.
         untouched = now.size > self._size or now.modified == self._state.modified
         if not untouched or self._read_ends() != self._ends:
             problem = f"{self._name}: the file was rewritten while it was read"
@@ -278,7 +278,7 @@ class OnDisk(Content):
 
 
 class Scattered(OnDisk):
-    """The bytes of a file that is read at a few widely spaced offsets.
+    """The bytes of a file that is read at a few distant offsets.
 
     The file is opened for each request, since a run may have written more such files than a process may have open.
     """
@@ -291,7 +291,7 @@ class Scattered(OnDisk):
 
     @cached_property
     def _own(self) -> local:  # type: ignore[override]  # a property overrides an attribute
-        """The window of the current thread; it is created at its first use, because most files need no window."""
+        """The window of the current thread; it is created on first use, because most files need no window."""
         from threading import local
 
         return local()
@@ -320,7 +320,7 @@ class Scattered(OnDisk):
             self._fill_from(file, room, begin)
 
     def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
-        """Fill the rows as `Content.fill_rows` does; the file is opened only once."""
+        """Fill the rows as `Content.fill_rows` does, but open the file only once."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
             for row, address in zip(room, range(begin, end, stride), strict=True):
@@ -330,7 +330,7 @@ class Scattered(OnDisk):
 
 
 def open_scattered(names: Sequence[str]) -> list[Scattered]:
-    """Return the contents of files that are read at a few offsets, once no write to these files is in progress.
+    """Return the contents of files that are read at a few offsets, once no write to them is in progress.
 
     Raises
     ------
@@ -342,7 +342,7 @@ def open_scattered(names: Sequence[str]) -> list[Scattered]:
 
 
 def open_content(name: str) -> bytes | OnDisk:
-    """Return the content of a file. A small file, or a file that is not a regular file, is returned as bytes.
+    """Return the content of a file; a small file, or anything other than a regular file, is read into memory.
 
     Raises
     ------
@@ -358,7 +358,7 @@ def open_content(name: str) -> bytes | OnDisk:
 
 
 def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
-    """Open a file again for a copy of its content in another process.
+    """Open a file again, to give another process a copy of its content.
 
     Raises
     ------
@@ -387,7 +387,7 @@ def count_line_number(data: Content, address: int) -> int:
 
 def _gather_fields(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     """Return ``width`` bytes at each offset, shape (n, width)."""
-    # The overlapping view has a field at every offset, so that fields can be selected by index.
+    # The view has a possibly overlapping field at every offset, so that fields can be selected by index.
     fields = np.ndarray(
         (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
     )

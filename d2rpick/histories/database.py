@@ -1,4 +1,4 @@
-"""Represent a file of a run, or several restart segments, as a database of columns that are read on request.
+"""Represent one or more restart segments of a run as a database whose columns are read on request.
 
 Databases of different formats that one run wrote are companions; they are checked here for being of one run.
 """
@@ -35,28 +35,28 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.intp]
 
-# Largest fraction of the states at which a time may step back [-]; columns other than times exceed it.
+# Time values may decrease at up to this fraction of the states [-]; columns other than the time exceed it.
 _MOST_BACK: Final = 0.1
-# Significant digits, keyed by the bytes of a number: single precision has 7, and 17 digits preserve every double.
+# Significant digits, keyed by bytes per number: single precision has 7, and 17 digits preserve every double.
 DIGITS: Final = {4: 7, 8: 17}
 
-# Smallest ratio of an interval between states to the median interval at which the interval is a gap in the output [-].
+# An interval between states longer than this is a gap in the output, relative to the median interval [-].
 _LONG = 30.0
-# Number of states whose time steps are compared at once, so that they fit into the processor's cache.
+# Number of states whose time steps are compared at a time; these states fit into the processor cache.
 _PIECE: Final = 1 << 15
-# Smallest fraction of the times in the coarser database that another database of the same run also contains [-].
-# A solver writes all databases of a run at its own cycles, even if their output intervals differ.
+# Smallest fraction of the times in the coarser database that a database of the same run also contains [-].
+# A solver writes each database of a run at cycles of its own, even if their output intervals differ.
 _FEWEST = 0.5
-# Largest difference of the end times of databases of one run [output intervals]; a killed run lacks some states.
+# Largest difference between the end times of databases of one run [output intervals]; a killed run lacks states.
 _ENDS_APART = 2.0
-# Tolerances for the excess of the internal energy of the parts over the energy of the model.
-# _MORE: excess relative to the largest energy of the model [-]; solver files need less than 0.1 %.
-# _ROUND_OFF: excess relative to the largest kinetic energy [-].
+# Tolerances by which the internal energy of the parts may exceed the energy of the model.
+# _MORE: tolerance relative to the largest energy of the model [-]; in solver files, less than 0.001 is needed.
+# _ROUND_OFF: additional tolerance relative to the largest kinetic energy of the model [-].
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
 class Database:
-    """The states of one restart segment of a run, in the units of the run; each reader defines their contents.
+    """The states of one restart segment of a run in the units of the run; each reader implements the methods.
 
     Times are those of the file: they may repeat or step back if a restart wrote a state again. A column that is
     missing, or not in every state, raises FormatError.
@@ -134,12 +134,12 @@ class Database:
         return self.branch("glstat").channel(name)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
+        """Return a quantity (``internal_energy``, ``x_momentum``, ...) of the given parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the nodes, shape (k,) [time]."""
+        """Times of the node states, shape (k,) [time]."""
         return self.time
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:  # noqa: ARG002  some subclasses use the argument
@@ -148,7 +148,7 @@ class Database:
 
     @property
     def energy_channel(self) -> str | None:
-        """Name of the internal energy of the model; None if the file does not contain this energy."""
+        """Name of the internal energy of the model; None if the file does not contain it."""
         for name in ("internal energy", "internal_energy"):
             if name in self.channels:
                 return name
@@ -159,7 +159,7 @@ class Database:
         return resolve_name(wanted, self.channels, self.source)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the energy unit in the name of a column; empty if the name contains no unit."""
+        """Return the energy unit given in the name of a column; empty if the name contains none."""
         return find_energy_unit(channel)
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  some subclasses use the argument
@@ -168,7 +168,7 @@ class Database:
 
 
 class Legs:
-    """The restart segments of one run in order, as one `Database`; if two overlap, the newer segment is used.
+    """The restart segments of one run in order, as one `Database`; where two overlap, the newer segment is used.
 
     A single segment needs this too if a restart wrote states again, or if printed times are equal. Segments that have
     no states are used only if no segment has states.
@@ -183,7 +183,7 @@ class Legs:
     ) -> None:
         self._cut = cut  # Names of the packed files that are truncated.
         self._own_notes = notes  # Notes on the files that were not read.
-        self._named = named  # Quantities whose channels have unusual names.
+        self._named = named  # Quantities whose channels have nonstandard names.
         self._files = self._legs = [*legs]
         if len(legs) > 1:  # The times of a single restart segment may not be known yet.
             self._files = sorted(legs, key=_make_leg_key)
@@ -199,7 +199,7 @@ class Legs:
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     def find_resume_points(self) -> Mapping[str, ResumePoint]:
-        """Return the place in each file where a later read can begin; empty if the files are read completely."""
+        """Return the position in each file where a later read can begin; empty if the files are read completely."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.resuming import join_resume_points
 
@@ -212,7 +212,7 @@ class Legs:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Columns of the whole model that all restart segments have."""
+        """Columns of the whole model that exist in all restart segments."""
         common = set(self._legs[0].channels)
         for leg in self._legs[1:]:
             common.intersection_update(leg.channels)
@@ -220,7 +220,7 @@ class Legs:
 
     @cached_property
     def quantities(self) -> Mapping[str, str]:
-        """Channels that were recognised by their names, keyed by quantity of `d2rpick.histories.names.QUANTITIES`.
+        """Channels recognised by name, keyed by quantity of `d2rpick.histories.names.QUANTITIES`.
 
         If several channels are named like a quantity, none of them is used, unless one has exactly the name of the
         quantity.
@@ -239,14 +239,14 @@ class Legs:
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """Parts that all restart segments have."""
+        """Parts that exist in all restart segments."""
         return mark_namesakes(
             part for part in self._legs[0].parts if part.id not in self._passing
         )
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the restart segments, and notes on states between them that were left out."""
+        """Notes of the restart segments, and notes on states that were left out between them."""
         # The columns are read first, because this may add notes to the restart segments.
         notes_on_states = self._kept[1] if self.channels else ()
         notes = [*self._own_notes]
@@ -266,7 +266,7 @@ class Legs:
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """First and last time [time]; None if there are no states."""
+        """First and last time [time]; None if the run has no states."""
         times = [time for time in _list_times(self) if time.size]
         return (float(times[0][0]), float(times[0][-1])) if times else None
 
@@ -285,7 +285,7 @@ class Legs:
         return self._legs[0].find(wanted)
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the energy unit in the name of a column; empty if the name contains no unit."""
+        """Return the energy unit given in the name of a column; empty if the name contains none."""
         return self._legs[0].find_energy_unit(channel)
 
     def channel(self, name: str) -> Samples:
@@ -319,7 +319,7 @@ class Legs:
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the nodes, shape (k,) [time]."""
+        """Times of the node states, shape (k,) [time]."""
         return self._joined([leg.node_time for leg in self._legs], self._nodes_kept)
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
@@ -337,7 +337,7 @@ class Legs:
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the contacts and rigid walls that all restart segments have."""
+        """Forces of the contacts and rigid walls that exist in all restart segments."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.contact_forces import join_contact_forces
 
@@ -369,13 +369,13 @@ class Legs:
 
     @cached_property
     def _nodes_kept(self) -> NDArray[np.bool_]:
-        """Valid states of the nodes."""
+        """Valid node states."""
         return self._order([leg.node_time for leg in self._legs])[0]
 
     def _order(
         self, times: Sequence[Samples]
     ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        """Return which states are valid, and notes on the invalid states."""
+        """Return a mask of the valid states, and notes on the invalid states."""
         for leg, time in zip(self._legs, times, strict=True):
             back = int(np.count_nonzero(time[1:] < time[:-1]))
             steps = time.size - 1
@@ -407,7 +407,7 @@ def _join_columns(columns: Sequence[Samples]) -> Samples:
 
 
 def _list_times(database: Database | Legs) -> list[Samples]:
-    """Return the times of the whole model and of the parts, as far as the database has them."""
+    """Return those times of the whole model and of the parts that the database contains."""
     return [
         *([database.time] if database.channels else []),
         *([database.part_time] if database.parts else []),
@@ -422,7 +422,7 @@ def _find_start(leg: Database) -> float:
 
 
 def _make_leg_key(leg: Database) -> tuple[float, list[tuple[str, int]]]:
-    """Return the sort key of a restart segment: its start time, then its name, whatever the order of the arguments."""
+    """Return a key that sorts restart segments by start time and then by name, whatever the order of the arguments."""
     pieces = re.findall(r"(\D*)(\d*)", leg.source)
     return _find_start(leg), [(text, int(number or -1)) for text, number in pieces]
 
@@ -433,7 +433,7 @@ def _count_digits(precision: Precision) -> int:
 
 
 def _note_holes(time: Samples) -> tuple[str, ...]:
-    """Return notes on long intervals without output, for which a restart segment may be missing."""
+    """Return notes on long intervals without output, which may mean that a restart segment is missing."""
     if time.size < 4:
         return ()
     pieces = (
@@ -455,7 +455,7 @@ def _note_holes(time: Samples) -> tuple[str, ...]:
 
 
 def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
-    """Raise FormatError if the parts have more internal energy than the whole model at the same times.
+    """Raise FormatError if the internal energy of the parts exceeds that of the whole model at the same times.
 
     ``energies`` are those of some parts of ``holder``, shape (n, parts) [energy].
     """
@@ -488,7 +488,7 @@ def check_energy_of_parts(whole: Legs, holder: Legs, energies: Samples) -> None:
 
 
 def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Yield a note on each pair of databases with few printed times in common, or with different end times."""
+    """Yield a note on each pair of databases that have few printed times in common or different end times."""
     for first, second in combinations(databases, 2):
         if not (first.span and second.span):
             continue
@@ -515,7 +515,7 @@ def note_doubts(databases: Sequence[Legs]) -> Iterator[str]:
 def _find_coincident(
     times: Samples, other_times: Samples, room: float
 ) -> tuple[Indices, Indices]:
-    """Return the indices of the times within ``room`` [time] of another time, and of the nearest other times.
+    """Return the indices of the times within ``room`` of another time, and of the other times nearest to them [time].
 
     Examples
     --------
@@ -536,7 +536,7 @@ def _find_coincident(
 
 
 def _compute_tolerance(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
-    """Return the largest difference of a printed time between databases that rounding can cause [time]."""
+    """Return the largest difference that rounding can cause between the printed times of databases [time]."""
     ends = zip(databases, times, strict=True)
     return (
         sum(

@@ -1,4 +1,4 @@
-"""Round and convert times as users read and type them: with six digits, optionally with a unit."""
+"""Round and convert times as users read and type them: six digits and an optional unit."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _TYPED_TIME: Final = (
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*([A-Za-zµμ]+)\s*"
 )
 
-# Smallest plausible value of a time converted to ms or us, as a fraction of the record from its start [-].
+# A time converted to ms or us is plausible at least this far from the record start, as a fraction of the record [-].
 _NEVER_MEANT: Final = 0.01
-# Smallest value of a time converted to a smaller unit that is suggested, as a fraction of the record [-].
+# A converted time is suggested at least this far from the record start, as a fraction of the record [-].
 _HARDLY_MEANT: Final = 0.05
-# Number of first states at which a td is assumed to be in another unit, because it would hardly save time.
-# Only in a record of 1000 or more states can both a td and 1000 times this td be times of the record.
+# A td within this many first states is assumed to be in another unit, because such an early td would hardly save time.
+# Only a record of 1000 or more states can contain both a td and 1000 times this td.
 _FIRST_STATES: Final = 10
 
 
@@ -52,7 +52,7 @@ def round_as_read(time: float) -> float:
 
 
 def round_to_first_as_read(time: float) -> float:
-    """Return the time rounded to six printed digits, or the time itself if that is earlier.
+    """Return the time rounded to six printed digits, or the time itself if it is earlier.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def round_to_first_as_read(time: float) -> float:
 
 
 def sum_times_as_read(time: float, further: float) -> float:
-    """Add two printed times, without the spurious digits of a sum of doubles.
+    """Add two printed times without the spurious digits of floating-point sums.
 
     Examples
     --------
@@ -74,7 +74,7 @@ def sum_times_as_read(time: float, further: float) -> float:
 
 
 def round_up_as_read(time: float) -> float:
-    """Return the first six-digit time at or after this time.
+    """Return the earliest six-digit time that is not before this time.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def round_up_as_read(time: float) -> float:
 
 
 def round_down_as_read(time: float) -> float:
-    """Return the last six-digit time at or before this time.
+    """Return the latest six-digit time that is not after this time.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def format_distinctly(numbers: Sequence[float]) -> list[str]:
 
 
 def format_beyond_limit(value: float, limit: float) -> str:
-    """Format a value beyond a limit with three digits, or with more digits if three would hide the excess.
+    """Format a value beyond a limit with three digits, or with more if three would hide how far it is beyond the limit.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def format_beyond_limit(value: float, limit: float) -> str:
 
 
 def parse_seconds(text: str) -> Decimal | None:
-    """Return the exact value of a time with a unit [s]; None if the string is not such a time.
+    """Return the exact value of a time that has a unit [s]; None for any other string.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def parse_seconds(text: str) -> Decimal | None:
 
 
 def convert_to_unit(text: str, unit: str) -> float | None:
-    """Return a time with a unit as a number in another ``unit``; None if it is no time or if its unit is unknown.
+    """Convert a time with a unit to a number in another ``unit``; None if it is not a time or its unit is unknown.
 
     Examples
     --------
@@ -179,13 +179,13 @@ def convert_to_unit(text: str, unit: str) -> float | None:
 
 
 def _find_next_printed(printed: float) -> float:
-    """Return the next number with six digits."""
+    """Return the next larger number with six digits."""
     mantissa, _, exponent = f"{printed:.{_DIGITS - 1}e}".partition("e")
     return float(f"{int(mantissa.replace('.', '')) + 1}e{int(exponent) - _DIGITS + 1}")
 
 
 def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
-    """Return the question whether times of an argument outside a ``record`` (n,) were given in a smaller unit.
+    """Return text that asks whether times of an argument outside a ``record`` (n,) were given in a smaller unit.
 
     The question is empty if that does not explain the value.
 
@@ -211,7 +211,7 @@ def ask_for_smaller_unit(record: Samples, times: Sequence[float], argument: str)
 def ask_for_larger_unit(
     record: Samples, times: Sequence[float], argument: str, unit: str = ""
 ) -> str:
-    """Return the question whether early times of an argument in a ``record`` (n,) in ms or us were given in s.
+    """Return text that asks whether early times for a ``record`` (n,) in ms or us were given in s.
 
     The question is empty if that does not explain the value.
     """
@@ -244,7 +244,7 @@ def convert_to_unit_of_record(
     ):
         return []
     earliest = min(early, first + _NEVER_MEANT * (last - first))
-    # The unit us is tried first, because a value in ms would lie too early in the record if both units are possible.
+    # The unit us comes first: if both units are possible, a value in ms would lie too early in the record.
     for size in (1e6, 1e3):
         values = _scale_times(times, size)
         if earliest <= values[-1] <= last:
@@ -253,11 +253,11 @@ def convert_to_unit_of_record(
 
 
 def _scale_times(times: Sequence[float], size: float) -> list[float]:
-    """Multiply times by the size of a unit, without the spurious digits of a product of doubles."""
+    """Multiply times by the size of a unit without the spurious digits of floating-point products."""
     return [float(f"{time * size:.12g}") for time in times]
 
 
 def _ask_for_unit(unit: str, argument: str, values: Sequence[float]) -> str:
-    """Return the question whether an argument was meant in another unit, with the converted values."""
+    """Return text that asks whether an argument was meant in another unit, and shows the converted values."""
     numbers = " ".join(f"{value:g}" for value in values)
     return f"; was it meant in {unit}? Then give `{argument}` {numbers}, in the unit of the record"

@@ -1,4 +1,4 @@
-"""Read LS-DYNA's ASCII databases rcforc (contacts) and rwforc (rigid walls), which contain only forces.
+"""Read the force-only ASCII databases of LS-DYNA: rcforc (contacts) and rwforc (rigid walls).
 
 A line of rcforc is a side of a contact at a time: ``slave 1 time 0.1 x 0.0 y 0.0 z 0.0 mass 0.0``; newer releases
 call the sides SURFA and SURFB. A line of rwforc is the time, the number of a wall, its normal force and the force
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
-# These patterns are compiled at their first use, to keep start-up fast.
+# These patterns are compiled on first use to keep start-up fast.
 _CONTACT_LINE: Final = (
     rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
     + rb" +[xyz] *".join([_NUMBER] * 4)
@@ -42,7 +42,7 @@ _HEAD: Final = 1 << 16
 
 
 class _Rows(NamedTuple):
-    """The contents of all data lines: id (n,), time (n,) and force (n, 3)."""
+    """The contents of all data lines: ids (n,), times (n,) and forces (n, 3)."""
 
     ids: Samples
     time: Samples
@@ -50,12 +50,12 @@ class _Rows(NamedTuple):
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if a file with these first bytes is an rcforc or rwforc; never raises."""
+    """Return True if a file with these first bytes is an rcforc or rwforc. This function never raises."""
     return re.search(_SIDE, head) is not None or re.search(_WALL_HEAD, head) is not None
 
 
 def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
-    """Return the forces in files; several files with the same contact are restart segments of a run.
+    """Return the forces in files; files that contain the same contact are treated as restart segments of a run.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_listed_forces(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
 
 
 def _join_legs(pieces: Sequence[ContactForce]) -> ContactForce:
-    """Join the restart segments of one contact; if two overlap, the newer segment is used."""
+    """Join the restart segments of one contact; where two overlap, the newer segment is used."""
     # Imported here to keep start-up fast.
     from d2rpick.histories.contact_forces import join_contact_forces
 
@@ -108,7 +108,7 @@ def _read_forces_of_file(source: Source) -> Iterator[ContactForce]:
 
 
 def _choose_largest_of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
-    """Return the line with the largest force at each time: both sides have the same force, or only one side has any."""
+    """Return, for each time, the line with the larger force; the force may be listed for one side only or for both."""
     order = np.lexsort((np.abs(forces).sum(axis=1), time))
     last = np.append(np.diff(time[order]) > 0, True)
     return time[order][last], forces[order][last]
@@ -122,7 +122,7 @@ def _read_contact_rows(data: bytes) -> _Rows:
 
 
 def _read_wall_rows(data: bytes) -> _Rows:
-    """Read the data lines of an rwforc. If the components are missing, the normal force becomes the first component."""
+    """Read the data lines of an rwforc. If they lack components, the normal force is used as the first component."""
     lines = np.array(re.findall(_WALL_LINE, data), dtype="S32")
     numbers = lines.astype(np.float64).reshape(-1, 6)
     forces = numbers[:, 3:]

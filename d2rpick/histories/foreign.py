@@ -1,4 +1,4 @@
-"""Recognise files in a run folder that contain no energy history, and name the file to use instead.
+"""Recognise files in a run folder that contain no energy history, and tell the user which file to use instead.
 
 Sources: the magic numbers of the formats; ISO/TS 13499 (ISO-MME); the universal file format of SDRC, dataset 58; the
 ASCII databases, d3hsp and messag of LS-DYNA; listings of Radioss; the status file of Abaqus.
@@ -20,8 +20,8 @@ _FROM_FRAME: Final = (
     "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
 )
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
-# Names of LS-DYNA's ASCII databases that contain no internal energy of the model or of its parts.
-# An ASCII database is recognised by its file name, and by words that no other database contains.
+# Names of LS-DYNA's ASCII databases without an internal energy of the model or its parts.
+# An ASCII database is recognised by its file name, or by words that occur in no other database.
 _DYNA_DATABASES: Final = (
     ("nodout", rb"n o d a l   p r i n t   o u t"),
     ("elout", rb"e l e m e n t   s t r e s s"),
@@ -218,7 +218,7 @@ def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> Non
 
 
 def _name_dyna_database(source: str, head: bytes) -> str:
-    """Return the name of an ASCII database of LS-DYNA according to content or file name; empty if it is unknown."""
+    """Return the name of an LS-DYNA ASCII database recognised by content or file name; empty if it is unknown."""
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
@@ -227,7 +227,7 @@ def _name_dyna_database(source: str, head: bytes) -> str:
 
 
 def _is_deck(head: bytes) -> bool:
-    """Return True if the content begins with deck keywords, possibly after comments."""
+    """Return True if the content begins with deck keywords, possibly preceded by comments."""
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
     first = next(
         (line for line in lines if line.strip() and not line.lstrip().startswith(b"$")),

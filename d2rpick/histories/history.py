@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 Samples: TypeAlias = "NDArray[np.float64]"
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
-# Largest energy that is accepted [energy]; squares of larger energies overflow a double.
+# Largest energy that is accepted [energy]; the squares of larger energies overflow a double.
 LARGEST_ENERGY: Final = 1e150
-# Largest speed of a part at rest, relative to the fastest part [-]; single precision leaves such speeds.
+# Largest speed of a part that is treated as at rest, relative to the fastest part [-]; rounding leaves such speeds.
 _STILL: Final = 1e-6
-# Number of times at which the energy is interpolated at once, so that the work arrays stay small.
+# Number of times at which the energy is interpolated at once; it is small to keep the work arrays small.
 _TOGETHER: Final = 1 << 14
 
 
@@ -63,7 +63,7 @@ class Precision(NamedTuple):
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
 
     def quanta(self, values: Samples) -> Samples:
-        """Return the distance between adjacent printable numbers near each of ``values``, in their shape."""
+        """Return the distance between adjacent printable numbers near each of ``values``, in the same shape."""
         if self.decimals is not None:
             return np.full(values.shape, 10.0**-self.decimals)
         sizes = np.abs(values)
@@ -75,7 +75,7 @@ class Precision(NamedTuple):
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
-        """Return the rounding error of printed values: half of the printed step at the largest value."""
+        """Return the rounding error of printed values, i.e. half of the last printed digit at the largest value."""
         return self.quantum(float(np.abs(values).max())) / 2
 
 
@@ -106,7 +106,7 @@ class Momenta:
     def choosing(
         self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
     ) -> Momenta:
-        """Return the momenta for another choice of parts to switch; computed results are kept."""
+        """Return the momenta with a different choice of parts to switch; results already computed are kept."""
         copy = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(copy, "memory", self.memory)
         return copy
@@ -123,7 +123,7 @@ class Momenta:
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
-        """Return the mass of the moving parts among the parts with these indices [mass]; NaN if a mass is unknown."""
+        """Return the mass of those of the given parts that move [mass]; NaN if a mass is unknown."""
         if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
@@ -134,7 +134,7 @@ class Momenta:
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
-        """Return the largest variation of any momentum component of these parts over the record [momentum]."""
+        """Return the largest variation over the record among all momentum components of these parts [momentum]."""
         lowest, highest = self._bounds
         return float((highest - lowest)[list(members)].max())
 
@@ -145,7 +145,7 @@ class Momenta:
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
-        """Indices of the parts that move: their momentum components are not all the same constant number."""
+        """Indices of the moving parts, i.e. those whose momentum components are not all the same constant number."""
         lowest, highest = self._bounds
         return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
 
@@ -172,13 +172,13 @@ class NodeMotion(NamedTuple):
 
 @remember
 def _sum_momenta(momenta: Momenta, *members: int) -> Samples:
-    """Return the sum of the momenta of some parts, read-only, shape (n, 3)."""
+    """Return the sum of the momenta of the given parts, read-only, shape (n, 3)."""
     return freeze(momenta.values[:, list(members)].sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance:
-    """Energies of the whole model at the times ``time``, shape (n,); an energy missing in the files is None.
+    """Energies of the whole model at the times ``time``, shape (n,); None stands for an energy missing in the files.
 
     ``sliding`` is the contact energy, ``friction`` its part from friction; ``damping`` and ``wall`` are dissipated by
     damping and at rigid walls. ``external_work`` is the work of all loads, ``total`` the total energy of the solver,
@@ -219,12 +219,12 @@ class Balance:
 
     @property
     def against_hourglassing(self) -> Samples | None:
-        """Hourglass energy, shape (n,), even if the internal energy contains it; None if it is unknown."""
+        """Hourglass energy, shape (n,), even if the internal energy includes it; None if it is unknown."""
         return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
     def worked(self) -> Samples | None:
-        """External work, shape (n,); None if the files do not contain it, or if it is always zero."""
+        """External work, shape (n,); None if the files do not contain it or if it is always zero."""
         if self.external_work is None or not np.ptp(self.external_work):
             return None
         return self.external_work
@@ -232,7 +232,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Given:
-    """Data in the files of a run that show flights, apart from the energy of the parts.
+    """Data other than the energy of the parts that show flights in a run.
 
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
@@ -249,15 +249,15 @@ class Given:
     written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  subclasses use the argument
-        """Return internal energies of some parts, ``values`` (n, parts) [energy]; None if the files lack them."""
+        """Return internal energies of the given parts, ``values`` (n, parts) [energy]; None if the files lack them."""
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""
         return self.written.displacements(ids) if self.written else None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the kinetic energy of some parts, or of the model, ``values`` (n,) [energy]; None if it is missing."""
+        """Return the kinetic energy of given parts or of the model, ``values`` (n,) [energy]; None if it is missing."""
         balance = self.balance
         if parts is not None or balance is None or balance.kinetic is None:
             return None
@@ -323,7 +323,7 @@ class History:
 
     @property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Known momenta: first those of the parts, then that of the whole model."""
+        """Momenta that the files contain: those of the parts first, then that of the whole model."""
         return self.evidence.momenta
 
     def find_momenta(self, *, of_parts: bool) -> Momenta | None:
@@ -335,7 +335,7 @@ class History:
 
     @property
     def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are known [mass], with NaN for an unknown mass; None if all are unknown."""
+        """Masses of the parts with known momenta [mass], with NaN for an unknown mass; None if all are unknown."""
         return self.evidence.masses
 
     @property
@@ -360,22 +360,22 @@ class History:
 
     @cached_property
     def step(self) -> float:
-        """Largest output interval [time], which limits the vibration frequencies that the record resolves."""
+        """Largest output interval [time], which limits the vibration frequencies that the record can resolve."""
         return float(np.max(np.diff(self.time)))
 
     @property
     def turns(self) -> Samples:
-        """Times of the states at which the energy has an extremum, ascending [time]."""
+        """Times of the states at which the energy has an extremum, in ascending order [time]."""
         return self._turns[0]
 
     @cached_property
     def peaks(self) -> Samples:
-        """Times of the states at which the energy has a maximum, ascending [time]."""
+        """Times of the states at which the energy has a maximum, in ascending order [time]."""
         return np.asarray(self.turns[self._turns[1]])
 
     @cached_property
     def _turns(self) -> tuple[Samples, NDArray[np.bool_]]:
-        """Times of the energy extrema, and an array that is True for maxima."""
+        """Times of the energy extrema, and a mask that is True for maxima."""
         indices, are_peaks = find_turns(self.energy)
         return self.time[indices], are_peaks
 
@@ -421,8 +421,8 @@ class History:
         )
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError if the times of an ``argument`` seem to be given in another unit than that of the record."""
-        # Usually no time lies below 1/1000 of the record, so that no further check is needed.
+        """Raise RangeError if the times of an ``argument`` seem to be in a unit other than that of the record."""
+        # Usually no time lies below 1/1000 of the record, and no further check is needed.
         if times[-1] * 1e3 > self.time[-1]:
             return
         from d2rpick.histories.digits import ask_for_larger_unit
@@ -441,12 +441,12 @@ class History:
         """Return the energy at ``time``, interpolated linearly; a RangeError for other times names ``argument``."""
         self.check(time, argument=argument)
         index = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        # A slice is passed, because numpy would copy the whole read-only array.
+        # A slice is passed, because numpy would copy the complete read-only array.
         cell = slice(index, index + 2)
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
-        """Return the energies at times within the record, interpolated linearly, in the shape of these times."""
+        """Return the energies at times within the record, interpolated linearly, in the shape of the times."""
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
@@ -469,13 +469,13 @@ class History:
         return float(energy.mean()) if energy.size else None
 
     def between(self, start: float, end: float) -> tuple[Samples, Samples]:
-        """Return times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
+        """Return the times [time] and energies [energy] of the states from ``start`` to ``end``, both included."""
         inside = find_window(self.time, start, end)
         return self.time[inside], self.energy[inside]
 
 
 def list_columns(record: History | Balance | Momenta) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a record with one row per time, keyed by name; part masses have no such rows."""
+    """Return the arrays of a record that have one row per time, keyed by name; part masses have no such rows."""
     columns: dict[str, NDArray[Any]] = {}
     for record_field in fields(record):
         values = getattr(record, record_field.name)

@@ -1,4 +1,4 @@
-"""Read the listings that solvers print: engine version, CPU time, and smallest time steps of the parts.
+"""Read the listings that solvers print, for the engine version, CPU times, and smallest time steps of the parts.
 
 Sources: the published source of OpenRadioss (radioss_title.F, rbyonf.F, or_build_info.py), its pull request 4538 and
 its commit 780156a9a; ``CUMULATIVE CPU TIME SUMMARY`` of Radioss' engine listing (NAME_0001.out); the timing
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import OpenedRun
 
-# These patterns are compiled at their first use by the functions of `re`, to keep start-up fast.
+# These patterns are compiled by the functions of `re` on first use, to keep start-up fast.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
 # Numbers of bytes that are read at the start and at the end of an engine listing.
 _HEAD, _TAIL = 1 << 20, 1 << 16
 _SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
 _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
-# Pattern of the copyright line, whose last year is the year of the build.
+# Pattern of the copyright line, whose last year is the year in which the engine was built.
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"
 _RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
-# date on which OpenRadioss corrected the energy of switched elements
+# Date on which OpenRadioss corrected the energy of switched elements
 _FIXED: Final = (2026, 1, 13)
-# Commits from the last weeks before this date; an engine built from them may show the year of the correction.
+# Commits from the weeks before OpenRadioss was corrected; an engine built from them may show the year 2026.
 _BEFORE: Final = (
     "49d9807 fe00fc0 ec1d512 76c61f5 52050b0 e28e42b 2b7ab50 6068aa2 0043df5 20f7b7f 0387857 c43d89c c36006f 670017c "
     "df5cc2b 047586b c3dff92 3844b9a 8751b9d f7fed09 cb26b37 062cdd8 e6f5601 ddf0b52 36f7b44 bcc1391 835210e 379fcb2 "
     "9e0e860 26e6573 0905ab7 96c6242 055fbad 9344188 cdf7934 49ecd10 eb51543 c2cb8fa 534623f 46f299a 8de64c8 43562a9 "
     "0260a03 d136353 7ca05a4 abdd714 0fd23b1 898ac63 9e2cfb1"
 )
-_SHORT: Final = 7  # number of digits of an abbreviated commit hash
+_SHORT: Final = 7  # Number of digits of an abbreviated commit hash
 
 WITH_AN_ERROR: Final = "with an error"
-# Texts at the end of Radioss' engine listing, and of LS-DYNA's messag and d3hsp.
+# Texts at the end of Radioss' engine listing and of LS-DYNA's messag and d3hsp.
 _ENDINGS: Final = {
     b"ERROR TERMINATION": WITH_AN_ERROR,
     b"E r r o r   t e r m i n a t i o n": WITH_AN_ERROR,
@@ -73,7 +73,7 @@ _STEP: Final = (
 )
 _TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
 _ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-# number of bytes at the start of a file that are searched for time steps
+# Number of bytes at the start of a file in which time steps are sought
 _SEARCHED: Final = 64 << 20
 _D3HSP: Final = "d3hsp"
 
@@ -94,7 +94,7 @@ def find_wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 
 
 def find_ending(history: str) -> str | None:
-    """Return how a run ended, according to the listing of its last history; None if it is unknown.
+    """Return how a run ended, according to the listing next to its last history; None if it is unknown.
 
     A restart segment that was told to stop has not ended the run, nor has one that another segment follows.
     """
@@ -115,7 +115,7 @@ def find_ending(history: str) -> str | None:
 
 
 def _read_ends(path: str) -> tuple[bytes, bytes]:
-    """Return the first and the last bytes of a file; empty if it cannot be read."""
+    """Return the first and last bytes of a file; both are empty if it cannot be read."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             return stream.read(_HEAD), read_tail(path, _TAIL)
@@ -167,7 +167,7 @@ class ZoneTimes(NamedTuple):
 
 
 def read_timing(path: str) -> Timing:
-    """Read the CPU times of a Radioss listing or a d3hsp.
+    """Read the CPU times in a Radioss listing or a d3hsp.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def read_timing(path: str) -> Timing:
 
 
 def read_zone_times(path: str) -> ZoneTimes:
-    """Read the times per zone cycle of a glstat; raise FormatError if none of them is above zero."""
+    """Read the times per zone cycle from a glstat; raise FormatError if none of them is positive."""
     pairs: list[tuple[float, float]] = []
     time = 0.0
     for line in re.finditer(_ZONE, _read_listing(path)):
@@ -234,7 +234,7 @@ def find_radioss_timing(name: str, data: bytes) -> Timing | None:
 
 
 def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
-    """Return the CPU times in a d3hsp without initialisation; elapsed times replace CPU times that are rounded to 0."""
+    """Return the CPU times in a d3hsp without initialisation; elapsed times replace CPU times rounded to zero."""
     table = data[data.rindex(_TIMING) :]
     cycles = re.search(_D3HSP_CYCLES, table)
     total = re.search(_D3HSP_TOTAL, table)
@@ -251,7 +251,7 @@ def _read_d3hsp_timing(name: str, data: bytes) -> Timing | None:
 def find_printed_steps(
     run: OpenedRun, *neighbours: str
 ) -> dict[int, tuple[float, str]]:
-    """Return the smallest time step of each part, and the name of the file that contains it, keyed by part id.
+    """Return the smallest time step of each part and the name of the file that contains it, keyed by part id.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def find_printed_steps(
 
 
 def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
-    """Yield the part that controls the time step of each cycle, and the time step printed below it."""
+    """Yield the part that controls the time step of each cycle, with the time step printed below it."""
     for file in run.files:
         part: bytes | None = None
         for line in re.finditer(_STEP, file.data[:_SEARCHED]):
@@ -286,7 +286,7 @@ def _read_steps_of_glstat(run: OpenedRun) -> Iterator[tuple[str, int, float]]:
 
 
 def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
-    """Yield the smallest time step of each part, from the table in each d3hsp found next to the given files."""
+    """Yield the smallest time step of each part, from the table in each d3hsp next to the given files."""
     from pathlib import Path
 
     for folder in dict.fromkeys(Path(name).parent for name in names):
@@ -303,7 +303,7 @@ def _read_steps_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float
 
 
 def _parse_part_and_step(part: bytes, step: bytes) -> tuple[int, float]:
-    """Return the part id and the time step; the time step is 0 if it is truncated."""
+    """Return the part id and the time step; a truncated time step gives 0."""
     try:
         return int(part), float(step)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Recognise the quantity of a column, curve or dataset by its name in tables, HDF5 and solver databases.
+"""Recognise the quantity in a column, curve or dataset from its name in tables, HDF5 files and databases.
 
 A name is cut into words, without its unit. The phrases of `d2rpick.histories.names` are compared with these words,
 the longest first. Words for the whole model change nothing ("Global Kinetic Energy", "ALLKE for Whole Model"); with
@@ -24,8 +24,8 @@ from d2rpick.histories.names import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-# Ranks of the match between a column name and a quantity, from the best to the worst.
-# The rank depends on the words that a name contains in addition to the quantity.
+# Ranks of the match between a column name and a quantity, from best to worst.
+# The rank depends on which words a name contains in addition to the quantity.
 EXACT: Final = 0
 WHOLE_MODEL: Final = 1
 OF_SOMETHING_ELSE: Final = 2
@@ -43,7 +43,7 @@ _WHOLE_MODEL_WORDS: Final = frozenset(
 _ENERGY_WORDS: Final = frozenset(
     {"energy", "energies", "energie", "energien", "energia", "energias", "energi", "energii", "energiya", "en"}
 )  # fmt: skip
-# Words that may occur in the name of the time of the states; "wall", "cpu" and "step" must not occur.
+# Words that may occur in the name of the time of the states, where "wall", "cpu" and "step" must not occur.
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
@@ -51,7 +51,7 @@ _TIME_WORDS: Final = frozenset(
 _NUMBERING: Final = re.compile(r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+")
 # Pattern of the name of a Radioss time history file, such as T01.
 _SOURCE: Final = re.compile(r"t\d\d")
-# Names of datasets whose group name contains the quantity, as in H5MD.
+# Names of datasets whose group name gives the quantity, as in H5MD.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
 # Names of datasets that are stored next to the values and contain no quantity.
 _STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})
@@ -62,9 +62,9 @@ _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
 _PLAIN_LETTERS: Final = str.maketrans(
     "àáâãäåçèéêëìíîïñòóôõöùúûüýÿąćęłńśźżčšžř", "aaaaaaceeeeiiiinooooouuuuyyacelnszzcszr"
 )
-_LONGEST_PHRASE: Final = 5  # largest number of words in the name of a quantity
+_LONGEST_PHRASE: Final = 5  # Largest number of words in the name of a quantity
 
-# Pattern of words that indicate another quantity than the internal energy. KE must be in capitals ("make").
+# Pattern of words that indicate a quantity other than internal energy. KE must be in capitals (unlike in "make").
 _OTHER_QUANTITY: Final = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
@@ -73,16 +73,16 @@ _OTHER_QUANTITY: Final = (
 )
 # Normalised name of the rotational energy, which Radioss writes although the kinetic energy contains it.
 ROTATION_ENERGY: Final = "rotationenergy"
-# Pattern of other energy names: identifiers of Abaqus, and "energy" in other languages without spaces.
+# Pattern of other energy names: Abaqus identifiers, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
 
-_MOST_NAMED: Final = 6  # largest number of energies that one note lists
+_MOST_NAMED: Final = 6  # Largest number of energies named in a note
 
 
 class Meaning(NamedTuple):
-    """The meaning of a name: a quantity, the rank of the match, and the words that mean something else."""
+    """The meaning of a name: a quantity, the rank of the match, and the words that denote something else."""
 
     quantity: str
     rank: int
@@ -101,7 +101,7 @@ _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
 
 @lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
 def find_meaning(name: str) -> Meaning | None:
-    """Return the quantity that a name means, with the rank of the match; None if it means none, or several.
+    """Return the quantity that a name denotes, with the rank of the match; None if it denotes none, or several.
 
     The name may be a path: its last step decides, if that means something.
 
@@ -118,7 +118,7 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_split_words("/".join(steps)))
-    # The name is not a path but contains a slash, such as "total energy / initial energy".
+    # The name contains a slash but is not a path, as in "total energy / initial energy".
     if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
@@ -128,14 +128,14 @@ def find_meaning(name: str) -> Meaning | None:
 
 
 def _split_words(name: str) -> list[str]:
-    """Split a name into lower-case words without accents and unit; "totalKineticEnergy" becomes three words."""
+    """Split a name into lower-case words without accents and unit; "totalKineticEnergy" gives three words."""
     text = _CAMEL_CASE.sub(" ", remove_unit(_NUMBERING.sub("", name)))
     text = text.casefold().translate(_PLAIN_LETTERS)
     return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
 
 
 def _match_words(words: Sequence[str]) -> Meaning | None:
-    """Return the meaning of the words of a name; None unless they contain exactly one quantity."""
+    """Return the meaning of the words in a name; None unless they contain exactly one quantity."""
     quantities: set[str] = set()
     other_words: list[str] = []
     rank, position = EXACT, 0
@@ -180,24 +180,24 @@ def is_time(name: str) -> bool:
 
 
 def is_internal_energy(name: str) -> bool:
-    """Return True if a name means internal energy and contains no other words."""
+    """Return True if a name denotes internal energy and contains no other words."""
     return find_meaning(name) == Meaning("internal_energy", EXACT)
 
 
 def is_any_internal_energy(name: str) -> bool:
-    """Return True if a name means an internal energy, whether of the model or of something else."""
+    """Return True if a name denotes an internal energy, whether of the model or of something else."""
     meaning = find_meaning(name)
     return meaning is not None and meaning.quantity == "internal_energy"
 
 
 def is_total_internal_energy(name: str) -> bool:
-    """Return True if a name explicitly means the internal energy of the whole model: "Total internal energy"."""
+    """Return True if a name explicitly denotes the internal energy of the whole model: "Total internal energy"."""
     meaning = find_meaning(name)
     return meaning is not None and meaning[:2] == ("internal_energy", WHOLE_MODEL)
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the indices of names that mean exactly an internal energy, or else of all names that mention one.
+    """Return the indices of names that denote exactly an internal energy, otherwise of all names that mention one.
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
@@ -207,7 +207,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        # The name of another quantity may contain these words, such as "dissipated internal energy".
+        # The name of a different quantity may contain these words, as "dissipated internal energy" does.
         is_other = re.search(_OTHER_QUANTITY, name)
         if meaning.rank == EXACT:
             exact.append(index)
@@ -217,7 +217,7 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
 
 
 def find_quantity(name: str) -> str | None:
-    """Return the whole-model quantity in `QUANTITIES` that a name means; None for any other name.
+    """Return the whole-model quantity in `QUANTITIES` that a name denotes; None for any other name.
 
     Examples
     --------
@@ -231,7 +231,7 @@ def find_quantity(name: str) -> str | None:
 
 
 def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the names that match each of `QUANTITIES` with the best rank, keyed by quantity.
+    """Return the names that best match each of `QUANTITIES`, keyed by quantity.
 
     If the only internal energy belongs to something else, quantities of the same thing are used: it is the subject of
     the table. A column named "total" contains the total energy if there is a kinetic energy too.
@@ -264,7 +264,7 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the words that name the owner of the only internal energy; empty if there are several energies or none."""
+    """Return the words that name the owner of the only internal energy; empty if there is not exactly one energy."""
     indices = find_internal_energies(names)
     meaning = find_meaning(names[indices[0]]) if len(indices) == 1 else None
     return meaning.others if meaning else ()
@@ -308,7 +308,7 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 
 def _has_name_of_energy(name: str) -> bool:
-    """Return True if a name means an energy or work, or resembles such a name."""
+    """Return True if a name denotes an energy or work, or resembles such a name."""
     # The kinetic energy contains the rotational energy.
     if normalise_name(name) == ROTATION_ENERGY:
         return False
@@ -319,7 +319,7 @@ def _has_name_of_energy(name: str) -> bool:
 
 
 def note_other_quantity(channel: str) -> tuple[str, ...]:
-    """Return a note if the channel used as internal energy has the name of another quantity.
+    """Return a note if the channel used as internal energy has the name of a different quantity.
 
     Examples
     --------
@@ -337,7 +337,7 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
-    """Raise FormatError if the only column or curve of a file has the name of another quantity."""
+    """Raise FormatError if the only column or curve of a file has the name of a different quantity."""
     word = _find_word_of_other_quantity(channel)
     if word:
         problem = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word})"
@@ -345,7 +345,7 @@ def refuse_other_quantity(channel: str, where: str) -> None:
 
 
 def _find_word_of_other_quantity(channel: str) -> str:
-    """Return the word that gives a name another meaning than internal energy; empty if there is none."""
+    """Return the word because of which a name does not denote internal energy; empty if there is none."""
     meaning = find_meaning(channel)
     is_known = meaning is not None and meaning.rank < OF_SOMETHING_ELSE
     if meaning and meaning.quantity == "internal_energy" and is_known:

@@ -22,12 +22,12 @@ _ENERGY_UNITS = frozenset(
      "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
-# Patterns of a unit in brackets: symbols with prefixes, and signs between the symbols ("N·mm", "-").
+# Pattern of a unit in brackets: symbols with prefixes, and signs between the symbols ("N·mm", "-").
 _PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
 _SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
 _UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
 
-# Names that mean a time, in normalised form.
+# Names that denote a time, in normalised form.
 TIME_NAMES: Final = frozenset(
     {"time", "t", "times", "timewhole", "zeit", "temps", "tempo", "tiempo", "tijd", "tid", "czas", "时间", "時間",
      "시간", "время"}
@@ -86,14 +86,14 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
-# Smallest number of letters at the beginning of a name that can identify the name.
+# Smallest number of leading letters that can identify a name.
 _SHORTEST_BEGINNING: Final = 3
-# Pattern of a number or range of part ids; a string with more digits is a title.
+# Pattern of a part id or a range of part ids; a string with more digits is treated as a title.
 _RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
 
 
 def find_unit(name: str) -> str:
-    """Return the unit at the end of a column name: in brackets, or after ``in``, ``/``, ``_``, ``,`` or a blank.
+    """Return the unit at the end of a column name: in brackets, or after ``in``, ``/``, ``_``, ``,`` or a space.
 
     Examples
     --------
@@ -114,7 +114,7 @@ def find_unit(name: str) -> str:
 
 
 def find_energy_unit(name: str) -> str:
-    """Return the unit at the end of an energy name; empty if there is no unit, or no energy unit.
+    """Return the unit at the end of an energy name; empty if there is none, or if it is not an energy unit.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def check_energy_unit(unit: str) -> str:
 
 
 def remove_unit(name: str) -> str:
-    """Return a name without its unit and without the word before the unit. Brackets without a unit stay.
+    """Return a name without its unit and the word before the unit. Brackets that contain no unit are kept.
 
     Examples
     --------
@@ -151,13 +151,13 @@ def remove_unit(name: str) -> str:
 
 
 def _drop_unit(brackets: re.Match[str]) -> str:
-    """Return a bracketed text, or an empty string if it contains a unit."""
+    """Return a text in brackets, or an empty string if the text contains a unit."""
     return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
 @lru_cache(maxsize=1 << 16)  # The same names are looked up repeatedly.
 def normalise_name(name: str) -> str:
-    """Reduce a name to its letters and digits, in lower case and without its unit.
+    """Reduce a name to its letters and digits, in lower case and without the unit.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def is_unit(cell: str) -> bool:
 
 
 def match_names(wanted: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that match ``wanted``: literally, else ignoring case, else ignoring the unit."""
+    """Return the indices of the names that match ``wanted`` exactly or, if none do, without case or unit."""
     spellings: tuple[Callable[[str], str], ...] = (
         str.strip,
         lambda text: text.strip().casefold(),
@@ -196,7 +196,7 @@ def match_names(wanted: str, names: Sequence[str]) -> list[int]:
 
 
 def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
-    """Return the only matching name; raise FormatError, with similar names, if none or several match.
+    """Return the only matching name; raise FormatError, with similar names, if no name or several names match.
 
     Examples
     --------
@@ -216,7 +216,7 @@ def resolve_name(wanted: str, names: Sequence[str], where: str) -> str:
 
 
 def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> str:
-    """Return a question with the most similar name; empty if no similarity reaches ``likeness`` (0 to 1).
+    """Return a question that suggests the most similar name; empty if no similarity reaches ``likeness`` (0 to 1).
 
     If no name is similar, the only name that begins with the wanted string is proposed.
 
@@ -237,7 +237,7 @@ def suggest_name(wanted: str, names: Sequence[str], likeness: float = 0.6) -> st
 
 
 def clean_text(raw: bytes) -> str:
-    r"""Return the text of a fixed field without padding; bytes that are not text become blanks.
+    r"""Return the text of a fixed-width field without padding; bytes that are not text become spaces.
 
     Examples
     --------
@@ -252,7 +252,7 @@ def clean_text(raw: bytes) -> str:
 
 
 def number_in_family(name: str, first: str) -> int | None:
-    """Return the number after the name of a family's first file in another file name; None if there is none.
+    """Return the number that a file name appends to the name of the first file in its family; None if there is none.
 
     Examples
     --------
@@ -265,7 +265,7 @@ def number_in_family(name: str, first: str) -> int | None:
 
 
 class Part(NamedTuple):
-    """A part of the model, with its number and title in the files of the solver."""
+    """A part of the model, with its number and title in the solver files."""
 
     id: int
     title: str
@@ -277,7 +277,7 @@ class Part(NamedTuple):
 
 
 class Namesake(Part):
-    """A part whose title is not unique, so that its name contains its number."""
+    """A part whose title is not unique; its name therefore contains its number."""
 
     __slots__ = ()
 
@@ -364,7 +364,7 @@ def _match_parts(
 def _match_piece(
     piece: str, parts: Sequence[Part], titled: Sequence[Part] | None, where: str
 ) -> Sequence[Part]:
-    """Return the parts selected by a number, range or title; ``titled`` are the parts whose title is this string."""
+    """Return the parts selected by a number, range or title; ``titled`` are the parts with this string as title."""
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
@@ -396,13 +396,13 @@ def _choose_only_part(titled: Sequence[Part], text: str, where: str) -> Part:
 
 
 def list_parts(parts: Sequence[Part]) -> str:
-    """Return numbers and titles of parts for use in a message."""
+    """Return the numbers and titles of parts for a message."""
     return list_names(
         [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
     )
 
 
 def has_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
-    """Return True if strings contain the word "recommended", unless this is the title of a part."""
+    """Return True if one of the strings is the word "recommended" and no part has this title."""
     titles = {part.title.strip().casefold() for part in parts}
     return "recommended" in {text.strip().casefold() for text in texts} - titles

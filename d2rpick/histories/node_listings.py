@@ -1,4 +1,4 @@
-"""Find the motion of nodes in a run, and read LS-DYNA's ASCII database nodout, which contains it.
+"""Find the motion of nodes in a run, possibly in LS-DYNA's ASCII database nodout, which this module reads.
 
 A state begins with ``n o d a l   p r i n t   o u t   f o r   t i m e  s t e p`` and its time. A line is the number of a
 node and its displacements, velocities, accelerations and coordinates; rotations follow in a block of their own. A state
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
 _STATE: Final = rb"(?m)^ *n o d a l   p r i n t   o u t   f o r   t i m e  s t e p"
 _COLUMNS: Final = rb"nodal point +x-disp +y-disp +z-disp"
 _NUMBER: Final = rb"([-+]?\d+\.\d*(?:[Ee][-+]\d+)?)"
-# These patterns are compiled at their first use, to keep start-up fast.
+# These patterns are compiled on first use to keep start-up fast.
 _TIME: Final = rb" *\d+ *\( *at time *" + _NUMBER + rb" *\)"
 _LINE: Final = rb"(?m)^ *(\d+) +" + rb" *".join([_NUMBER] * 3) + rb"(?=[-+ \r\n])"
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if a file with these first bytes is a nodout with displacements; never raises."""
+    """Return True if a file with these first bytes is a nodout with displacements. This function never raises."""
     return re.search(_STATE, head) is not None and re.search(_COLUMNS, head) is not None
 
 
 def find_motion(
     databases: Sequence[Legs], listings: Sequence[Source], wanted: set[int]
 ) -> NodeMotion | None:
-    """Return the motion of those wanted nodes that the first source with such nodes contains.
+    """Return the motion of wanted nodes from the first source that contains any of them.
 
     None if neither the databases of a run nor its listings of nodes contain them, or if their records are damaged.
     """
@@ -53,7 +53,7 @@ def find_motion(
 
 
 def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
-    """Return the motion of the wanted nodes that a database contains; None if it contains no such node."""
+    """Return the motion of the wanted nodes that a database contains; None if it contains none of them."""
     ids = tuple(id_ for id_ in database.node_ids if id_ in wanted)
     if not ids:
         return None
@@ -63,7 +63,7 @@ def _read_database(database: Legs, wanted: set[int]) -> NodeMotion | None:
 def read_listed_nodes(
     sources: Sequence[Source], wanted: Collection[int]
 ) -> NodeMotion | None:
-    """Return the motion of those wanted nodes that all files contain; several files are restart segments of a run.
+    """Return the motion of the wanted nodes that all files contain; the files are restart segments of one run.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def _read_file(source: Source) -> NodeMotion:
 
 
 def _read_states(data: bytes) -> Iterator[NodeMotion]:
-    """Yield the motion of each state that has displacements."""
+    """Yield the motion at each state that has displacements."""
     for block in re.split(_STATE, data)[1:]:
         time = re.match(_TIME, block)
         if time is None or re.search(_COLUMNS, block) is None:

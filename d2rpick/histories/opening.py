@@ -1,4 +1,4 @@
-"""Open a run: find the reader of each file according to the content of the file."""
+"""Open a run: find the reader of each file by the content of the file."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ __all__ = [
     "open_sources",
 ]
 
-# Number of bytes that contain the header of a file and more than one state of the longest blocks.
+# Number of bytes that contain the header of a file and more than one state, even if its blocks are long.
 _HEAD = 8192
 _DEFAULT = Selection()
-# Upper limit for the length of the legend in an ASCII database [bytes].
+# Largest length of the legend in an ASCII database [bytes].
 _LONGEST_LEGEND: Final = 1 << 24
-# Largest number of unused tables that a note names.
+# Largest number of unused tables named in a note.
 _MOST_TABLES: Final = 3
-# Words above the states of LS-DYNA's nodout.
+# Words that LS-DYNA prints above the states in a nodout.
 _NODOUT: Final = b"n o d a l   p r i n t   o u t"
-# Characters at the end of the name of a later file of a family.
+# Characters at the end of the name of a later file in a family.
 _DIGITS: Final = "0123456789"
 
-# Largest difference of energies at a common time of two restart segments, relative to the largest energy [-].
+# Largest difference between the energies of two restart segments at a common time, relative to the largest energy [-].
 _SAME = 0.01
 # Number of parts whose energies are compared to recognise restart segments of different runs.
 _COMPARED = 50
@@ -60,16 +60,16 @@ class Reader(Protocol):
     """The functions that each reader module defines; the module of a table format also defines ``write``."""
 
     def recognises(self, head: bytes) -> bool:
-        """Return True if a file with these first bytes has the format of the reader; never raises."""
+        """Return True if a file with these first bytes has the format of the reader. This function never raises."""
 
     def open_legs(
         self, sources: Sequence[Source], selection: Selection
     ) -> Sequence[Database]:
-        """Open files of this format as the restart segments of one run; raise FormatError if one has another format."""
+        """Open files of this format as the restart segments of one run; raise FormatError for any other format."""
 
 
 def load_reader(kind: str) -> Reader:
-    """Import the reader of a format, which is a key of `READERS`."""
+    """Import the reader of a format, given by its key in `READERS`."""
     return cast(
         "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
     )
@@ -78,7 +78,7 @@ def load_reader(kind: str) -> Reader:
 def open_run(
     names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
 ) -> OpenedRun:
-    """Open the files of one run: files of one format are its restart segments, other files are companions.
+    """Open the files of one run; files of one format are its restart segments, other files are companion files.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def open_run(
 
 
 def _note_unused_tables(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a note on energy tables in named folders; they are not read next to solver databases."""
+    """Return a note on energy tables in named folders, which are not read next to solver databases."""
     tables = [table for name in names for table in list_tables_of_folder(name)]
     if not tables:
         return ()
@@ -118,7 +118,7 @@ def open_sources(
     input_format: str = "auto",
     notes_on_names: tuple[str, ...] = (),
 ) -> OpenedRun:
-    """Open the files of one run from their bytes; arguments and errors are those of `open_run`.
+    """Open the files of one run from their bytes; the arguments and errors are those of `open_run`.
 
     ``notes_on_names`` are about the names by which the files were found.
     """
@@ -168,7 +168,7 @@ def open_sources(
     for kind in FAMILIES:
         later_files |= _find_later_files(kinds.get(kind, ()))
     files = tuple(source for source in (*sources, *listings) if source.name in used)
-    # The first file of a family stands for all its files.
+    # The first file of a family stands for all files of the family.
     names = tuple(source.name for source in files if source.name not in later_files)
     reopen = partial(_reopen, files, selection, input_format, notes_on_names)
     return OpenedRun(
@@ -189,7 +189,7 @@ def _reopen(
     notes_on_names: tuple[str, ...],
     surroundings: Surroundings,
 ) -> OpenedRun:
-    """Open a run again with other external forces (``surroundings``)."""
+    """Open a run again with different external forces (``surroundings``)."""
     run = open_sources(sources, selection, input_format, notes_on_names)
     return run.within(surroundings)
 
@@ -209,7 +209,7 @@ def _sort_by_format(
     """
     formats: dict[str, str] = {}
     foreign: list[tuple[Source, FormatError]] = []
-    # The first file of a family comes before its later files, whose names end with digits.
+    # The first file of a family precedes its later files, whose names end with digits.
     for source in sorted(sources, key=lambda source: source.name[-2:].isdigit()):
         first = formats.get(source.name.rstrip(_DIGITS))
         try:
@@ -257,7 +257,7 @@ def _note_left_out_file(source: Source, refusal: str) -> str:
 def _sort_forces_last(
     opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
 ) -> list[str]:
-    """Return the formats with those that contain only forces last; raise FormatError if there are no others."""
+    """Return the formats, those with only forces last; raise FormatError if all formats contain only forces."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
         # Reading the branch raises the error with the best message about missing data.
@@ -266,14 +266,14 @@ def _sort_forces_last(
 
 
 def _is_force_listing(source: Source) -> bool:
-    """Return True if a file is a listing of forces; files of families are never listings."""
+    """Return True if a file is a force listing; a file of a family never is."""
     return not isinstance(source.data, Scattered) and force_listings.recognises(
         source.data[:_HEAD]
     )
 
 
 def _is_node_listing(source: Source) -> bool:
-    """Return True if a file is a listing of nodes; files of families are never listings."""
+    """Return True if a file is a node listing; a file of a family never is."""
     if isinstance(source.data, Scattered) or _NODOUT not in _head_of(source):
         return False
     # Imported here to keep start-up fast.
@@ -285,7 +285,7 @@ def _is_node_listing(source: Source) -> bool:
 def _read_force_listings(
     sources: Sequence[Source],
 ) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
-    """Read the forces in files without energies; return a note instead if they cannot be read."""
+    """Read the forces in files without energies, or return a note if the forces cannot be read."""
     try:
         return force_listings.read_listed_forces(sources), ()
     except FormatError as error:
@@ -293,7 +293,7 @@ def _read_force_listings(
 
 
 def _find_later_files(sources: Sequence[Source]) -> set[str]:
-    """Return the names of the later files of families; the first file of a family stands for all its files."""
+    """Return the names of the later files of families; the first file of a family stands for all of them."""
     names = {source.name for source in sources}
     return {
         name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names
@@ -326,19 +326,19 @@ def _open_legs_of_formats(
 
 
 def _has_model_and_parts(legs: Sequence[Database]) -> bool:
-    """Return True if databases have histories of the whole model and of its parts."""
+    """Return True if databases contain histories both of the whole model and of its parts."""
     return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
-    """Raise FormatError if a channel that the user names for a quantity is in none of the databases."""
+    """Raise FormatError if no database has a channel that the user names for a quantity."""
     for quantity, name in selection.channels:
         if not any(quantity in database.quantities for database in databases):
             databases[0].find(name)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
-    """Raise FormatError if ``--time`` would be ignored: solver files have one time, named 'time'."""
+    """Raise FormatError if ``--time`` would be ignored, because solver files have only one time, named 'time'."""
     if (
         time is not None
         and time.strip().casefold() != "time"
@@ -350,7 +350,7 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 
 
 def _detect_format(source: Source) -> str:
-    """Return the format of a file. Binary signatures come first; a text is a table only if no other format matches."""
+    """Return the format of a file. Binary signatures are tested first, and tables last."""
     head = _head_of(source)
     is_binary = b"\0" in head
     if is_binary:
@@ -388,7 +388,7 @@ def _refuse_foreign(name: str, head: bytes) -> None:
 
 
 def _head_of(source: Source) -> bytes:
-    """Return the first bytes of a file, and the bytes after the legend if it is an ASCII database of LS-DYNA."""
+    """Return the first bytes of a file; for an LS-DYNA ASCII database, add the bytes after the legend."""
     head = source.data[:_HEAD]
     if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
         end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
@@ -449,17 +449,17 @@ def _list_columns_and_parts(leg: Database) -> set[str | int]:
 
 
 def _list_model_times(leg: Database) -> Samples:
-    """Return the times of the whole model, shape (n,); empty if the segment has no columns."""
+    """Return the times of the states with model quantities, shape (n,); empty if the restart segment has none."""
     return leg.time if leg.channels else np.empty(0)
 
 
 def _list_part_times(leg: Database) -> Samples:
-    """Return the times of the parts, shape (n,); empty if there are no parts."""
+    """Return the times of the states with part quantities, shape (n,); empty if the restart segment has none."""
     return leg.part_time if leg.parts else np.empty(0)
 
 
 def _read_model_energies(leg: Database, states: Indices) -> Samples:
-    """Return the internal energy of the model at given states, shape (states,), or an empty array (states, 0)."""
+    """Return the internal energy of the model at given states, shape (states,), or (states, 0) if it is missing."""
     name = leg.energy_channel
     return leg.channel(name)[states] if name else np.empty((states.size, 0))
 
@@ -473,7 +473,7 @@ def _read_part_energies(leg: Database, states: Indices) -> Samples:
 def _find_shared_states(
     first: Samples, second: Samples
 ) -> tuple[Indices, Indices] | None:
-    """Return the indices of common times in two restart segments; only the first of them if one begins later."""
+    """Return the indices of common times in two restart segments; only the first time if one segment begins later."""
     _, in_first, in_second = np.intersect1d(first, second, return_indices=True)
     if not in_first.size:
         return None

@@ -1,4 +1,4 @@
-"""Continue reading files that grow: a later read uses only the header of a file and its last states."""
+"""Continue reading growing files: a later read uses only the header of a file and its last states."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class ResumePoint(NamedTuple):
-    """The place at which a later read of a file that has grown can begin.
+    """The position at which a later read of a growing file can begin.
 
     ``head`` followed by the bytes of the file from ``begin`` on is a file of the same format with the last states only.
     ``end`` is the address after the last whole state: what was read behind it lacks some lines of a state.
@@ -22,13 +22,13 @@ class ResumePoint(NamedTuple):
     end: int
 
     def read_on(self, name: str) -> bytes:
-        """Return the header of a file, and its bytes after ``begin``; raise OSError if they cannot be read."""
+        """Return the header of a file and its bytes after ``begin``; raise OSError if they cannot be read."""
         with open(name, "rb") as stream:  # noqa: PTH123  pathlib would slow down start-up
             stream.seek(self.begin)
             return self.head + stream.read()
 
     def locate(self, point: ResumePoint) -> ResumePoint:
-        """Convert a resume point in the bytes returned by `read_on` to one with addresses in the file."""
+        """Convert a resume point in the bytes returned by `read_on` to a resume point in the file."""
         skipped = self.begin - len(self.head)
         return ResumePoint(point.head, point.begin + skipped, point.end + skipped)
 

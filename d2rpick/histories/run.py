@@ -1,4 +1,4 @@
-"""Represent all files of one run, and select the energy in them."""
+"""Represent all files of one run, and select an energy in them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class OpenedRun:
-    """The databases of one run, one per format, with the most comprehensive one first.
+    """The databases of one run, one per format, from most to least comprehensive.
 
     ``sources`` are the names of the files, ``files`` their contents. ``surroundings`` are the forces from outside.
     ``reopen`` opens the same files again with other surroundings, which is how a run is copied to another process.
@@ -89,7 +89,7 @@ class OpenedRun:
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> OpenedRun:
-        """Return the run with other external forces on its parts (``surroundings``)."""
+        """Return the run with different external forces on its parts (``surroundings``)."""
         return OpenedRun(
             self.sources,
             self.databases,
@@ -103,7 +103,7 @@ class OpenedRun:
 
     @property
     def name(self) -> str:
-        """The file names, joined for use in messages."""
+        """The file names, joined for messages."""
         return ", ".join(self.sources)
 
     @property
@@ -175,7 +175,7 @@ class OpenedRun:
         return tuple(momenta for momenta in (of_parts, of_whole) if momenta)
 
     def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
-        """Return the parts without supports; if all parts have supports, return all parts."""
+        """Return the parts without supports, or all parts if all have supports."""
         return [
             part for part in parts if not self.surroundings.supports_of([part])
         ] or parts
@@ -236,7 +236,7 @@ class OpenedRun:
         return np.where(massless, 0.0, ratios)
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
-        """Return the part masses; an unknown mass is the smallest possible for its momentum and kinetic energy."""
+        """Return the part masses; an unknown mass is set to the smallest that fits its momentum and kinetic energy."""
         from d2rpick.histories.balance import compute_least_masses
 
         masses = self._masses(momenta, holder)
@@ -272,14 +272,14 @@ class OpenedRun:
         return None
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.node_listings import find_motion
 
         return find_motion(self.databases, self._nodes, set(ids))
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the total momentum of given parts, or of the whole model; None if the files do not contain it."""
+        """Return the total momentum of the given parts, or of the whole model; None if the files do not contain it."""
         of_parts = parts is not None
         for momenta in self.momenta(parts, None):
             if (momenta.parts is not None) == of_parts:
@@ -293,7 +293,7 @@ class OpenedRun:
 
     @cached_property
     def springs(self) -> tuple[Part, ...]:
-        """Parts that are springs or dampers according to their energies."""
+        """Parts that are springs or dampers, judging by their energies."""
         from d2rpick.histories.balance import find_springs
 
         parts = self.parts
@@ -304,15 +304,15 @@ class OpenedRun:
         return find_springs(self.databases, parts, energies, self.part_time)
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return internal energies of given parts, shape (n, parts), at the times of the parts [energy]."""
+        """Return the internal energies of the given parts, shape (n, parts), at the times of the parts [energy]."""
         return self._of_holder("internal_energy", parts)
 
     def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
-        """Return kinetic energies of given parts, shape (n, parts) [energy]; raise FormatError if they are missing."""
+        """Return the kinetic energies of the given parts, shape (n, parts) [energy], or raise FormatError."""
         return self._of_holder("kinetic_energy", parts)
 
     def quantities(self, time: Samples) -> dict[str, Samples]:
-        """Return the quantities of the whole model that are written at ``time`` (n,), keyed by name."""
+        """Return the quantities of the whole model that are written at the times ``time`` (n,), keyed by name."""
         columns: dict[str, Samples] = {}
         for database in self.databases:
             if not database.channels or not np.array_equal(database.time, time):
@@ -327,7 +327,7 @@ class OpenedRun:
         return columns
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
-        """Return the mean position of the centres of given parts [length]; None if the files do not contain it."""
+        """Return the mean position of the centres of the given parts [length]; None if the files do not contain it."""
         components = give_if_written(
             lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
         )
@@ -336,11 +336,11 @@ class OpenedRun:
         return Track(self.part_time, np.stack(components, axis=1))
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
-        """Return a quantity of given parts, shape (n, parts)."""
+        """Return a quantity of the given parts, shape (n, parts)."""
         return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
-        """Return the history of the selected energy only, without other data that show flights."""
+        """Return the history of the selected energy only, without any other data that show flights."""
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
@@ -359,7 +359,7 @@ class OpenedRun:
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
-        """Return the database with parts; otherwise raise a FormatError that names the contents of the files."""
+        """Return the database with parts; if there is none, raise a FormatError that lists what the files contain."""
         holder = self._with_parts()
         if holder is None:
             # The first database raises the error with the best message about missing parts.
@@ -370,7 +370,7 @@ class OpenedRun:
         return holder
 
     def _with_parts(self) -> Legs | None:
-        """Return the first database with parts; None if there is none."""
+        """Return the first database that contains parts; None if there is none."""
         return next((database for database in self.databases if database.parts), None)
 
     def _of_parts(
@@ -382,7 +382,7 @@ class OpenedRun:
         for database in self.databases:
             check_energy_of_parts(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
-        # If no other part has energy, the springs are not left out.
+        # Springs are not left out if no other part has energy.
         if not energies[:, ~left_out].any():
             left_out[:] = False
         idle = [
@@ -456,7 +456,7 @@ class OpenedRun:
         )
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
-        """Return the database that has all these channels, and their names in it."""
+        """Return the database that has all these channels, and the names of the channels in it."""
         refusals = []
         for database in sorted(self.databases, key=lambda legs: not legs.channels):
             try:
@@ -472,7 +472,7 @@ class OpenedRun:
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip
-        """Return the history of an energy (n,), with the names and precisions of its database."""
+        """Return the history of an energy (n,) with the names and precisions of its database."""
         time_precision, energy_precision = database.precisions(names)
         return History(
             time=time,
@@ -493,13 +493,13 @@ class OpenedRun:
 
 
 def _find_common_energy_unit(database: Legs, names: Sequence[str]) -> str:
-    """Return the energy unit of all these channels; empty if a channel has no unit, or if the units differ."""
+    """Return the energy unit common to all these channels; empty if a channel has no unit, or if units differ."""
     units = {database.find_energy_unit(name) for name in names}
     return units.pop() if len(units) == 1 else ""
 
 
 class _Written(Given):
-    """The data in the files of a run that show the flights of given parts; they are read on request."""
+    """The data in the files of a run that show the flights of the given parts, read on request."""
 
     def __init__(
         self,
@@ -511,7 +511,7 @@ class _Written(Given):
 
     @cached_property
     def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, and then of the whole model."""
+        """Momenta of the parts, followed by that of the whole model."""
         return self._run.momenta(self._chosen, self._flying)
 
     @cached_property
@@ -542,11 +542,11 @@ class _Written(Given):
         return read_terms(self._run.databases)
 
     def displacements(self, ids: Sequence[int]) -> NodeMotion | None:
-        """Return the displacements of those requested nodes that the files contain; None if they contain none."""
+        """Return the displacements of the requested nodes that the files contain; None if they contain none of them."""
         return self._run.displacements(ids)
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
-        """Return internal energies of given parts; None if the files do not contain them."""
+        """Return the internal energies of the given parts; None if the files do not contain them."""
         table = self._find_table_with_others()
         if table is not None and not self._run.parts:
             return Track(table.time, read_energies_of_parts_not_chosen(table, parts))
@@ -554,7 +554,7 @@ class _Written(Given):
         return None if values is None else Track(self._run.part_time, values)
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Return the total kinetic energy of given parts, or of the model; None if the files do not contain it."""
+        """Return the total kinetic energy of the given parts, or of the model; None if the files do not contain it."""
         if parts is None:
             return super().kinetic_energy(parts)
         values = give_if_written(lambda: self._run.part_kinetic_energies(parts))
@@ -572,7 +572,7 @@ def _list_energy_channels(database: Legs, selection: Selection) -> list[str]:
 
 
 def _compute_median_of_nonzero(values: Samples) -> Samples:
-    """Return the median of each column of values (n, k) over the states in which the column is not 0.
+    """Return the median of each column of values (n, k) over the states in which this column is not 0.
 
     The mass of a rigid part is 0 in some states.
     """
@@ -586,5 +586,5 @@ def _compute_median_of_nonzero(values: Samples) -> Samples:
 
 
 def _note_left_out_springs(springs: str) -> str:
-    """Return the note that the energy of springs is left out."""
+    """Return the note that the spring energy is left out."""
     return f"the energy of {springs} was left out: it contains what their dampers dissipate, which never comes back"

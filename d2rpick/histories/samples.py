@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
-# Smallest fraction of states that repeat the previous time, in a table with a row for each part [-].
+# Smallest fraction of states that repeat the previous time in a table with one row per part and time [-].
 _REPEATED: Final = 0.49
-# Smallest number of times that is examined; in fewer rows, equal times may be a coincidence.
+# Smallest number of times examined; in fewer rows, equal times may be a coincidence.
 FEWEST_TIMES: Final = 3
 # Largest ratio of the output intervals before and after a restart [-]; unsorted tables and other curves exceed it.
 _ALIKE = 2.0
-# Number of adjacent windows that are combined into one window of the next level of the search table.
+# Number of adjacent windows that are combined into one window on the next level of the search table.
 _TOGETHER: Final = 8
-# Largest relative change of the time of a root that has converged [-]; this is about the rounding error.
+# Largest relative change of the time of a converged root [-]; it is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
-HALVINGS: Final = 50  # number of bisections that narrow a bracket to the rounding error
+HALVINGS: Final = 50  # Number of bisections that narrow a bracket to rounding error
 
 
 def find_window(time: Samples, start: float, end: float) -> slice:
@@ -47,7 +47,7 @@ def get_ends(time: Samples) -> tuple[float, ...]:
 
 
 def integrate_by_trapezia(time: Samples, values: Samples) -> Samples:
-    """Return the cumulative integral of values (n,) or (n, k) from the first time on, by the trapezoidal rule.
+    """Return the cumulative trapezoidal integral of values (n,) or (n, k), starting at the first time.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def remove_line(time: Samples, values: Samples) -> Samples:
     >>> remove_line(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    # The sum is used instead of mean(), which is slow for few values.
+    # The sum is used instead of mean(), which is slow for a few values.
     t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
@@ -114,7 +114,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    if np.all(time[1:] > time[:-1]):  # Usually, all times ascend.
+    if np.all(time[1:] > time[:-1]):  # Usually, all times are ascending.
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
     equal = int(np.count_nonzero(step == 0))
@@ -141,7 +141,7 @@ def find_newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...
 
 
 def count_rows_per_time(time: Samples) -> int:
-    """Return the median number of rows that share a time (n,); 1 if most times occur in only one row.
+    """Return the median number of rows per time (n,); 1 if most times occur in only one row.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def check_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
 
 
 def _find_wrong_step_back(time: Samples) -> int | None:
-    """Return the first state at which times (n,) step back without a restart that explains it; None if there is none.
+    """Return the first state at which times (n,) step back without a restart that explains this; None if there is none.
 
     One step back is a restart if it does not go back to the start, and if the interval after it (the first one and
     the median) is half to twice the median interval before it.
@@ -208,7 +208,7 @@ def _compute_median_step(steps: Samples) -> float:
 def find_crossings(
     time: Samples, energy: Samples, level: float
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of rising crossings.
+    """Return the times (k,) at which ``energy`` crosses ``level``, ascending, and a mask (k,) of the rising crossings.
 
     Between samples the energy is linear: for piecewise linear data the result is exact to rounding. The energy
     crosses the level if it is on different sides before and after:
@@ -272,12 +272,12 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
 
 
 def _compare_sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
-    """Return 1 where values (n,) are above the limits, -1 where they are below, else 0, as 1-byte integers."""
+    """Return 1 where values (n,) are above the limits, -1 where they are below, and 0 elsewhere, as 1-byte integers."""
     return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
 def find_stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
-    """Return slices of at least ``fewest`` consecutive ``states`` (n,) that are True.
+    """Return the slices of at least ``fewest`` consecutive ``states`` (n,) that are True.
 
     Examples
     --------
@@ -304,7 +304,7 @@ def find_first_above(
     >>> find_first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
-    # Element i of ``tops`` contains the largest of ``_TOGETHER**i`` values from each index on.
+    # ``tops[i][k]`` is the largest of the ``_TOGETHER**i`` values from index k on.
     tops = [np.append(values, np.inf)]
     width = 1
     indices = np.arange(values.size + 1)
@@ -362,7 +362,7 @@ def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
 
 
 class Roots(NamedTuple):
-    """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, the root ``at``."""
+    """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, and the root ``at``."""
 
     within: Samples
     beyond: Samples
@@ -377,7 +377,7 @@ def narrow_brackets(
     slope: Callable[[Samples], Samples] | None = None,
     steps: int = HALVINGS,
 ) -> Roots:
-    """Narrow brackets around the roots at which ``inside`` changes from positive to non-positive.
+    """Narrow the brackets around the roots at which ``inside`` changes from positive to non-positive.
 
     Parameters
     ----------

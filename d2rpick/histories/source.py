@@ -1,4 +1,4 @@
-"""Find the files of a history and read their bytes: files, folders, glob patterns, standard input."""
+"""Find the files of a history (files, folders, glob patterns, standard input) and read their bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-# Pattern of the file names of LS-DYNA's d3 families: job name, name of the family, number of the file.
+# Pattern of the file names of LS-DYNA's d3 families: job name, family name, file number.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
 # Pattern of the file names of force listings, which are read together with files that contain energies.
 _FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
@@ -35,12 +35,12 @@ _NUMBER = r"\d+\.?\d*|\.\d+"
 _ENERGY_IN_HEAD: Final = b"energy"
 _HEAD_OF_TABLE: Final = 4096
 
-# Pattern of a file name with the number of its restart segment (runT01, binout0001), if there is one.
+# Pattern of a file name with or without the number of a restart segment (runT01, binout0001).
 _NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
 class Source(NamedTuple):
-    """The unpacked bytes of one file, in memory or on disk, under the name that the user gave the file.
+    """The unpacked bytes of one file, in memory or on disk, under the name that the user gave for the file.
 
     ``cut`` is True if packed data ends early: ``data`` is what could be unpacked of ``packed``. ``by_pattern`` is
     True if a pattern or folder matched the file, rather than its name.
@@ -53,7 +53,7 @@ class Source(NamedTuple):
     by_pattern: bool = False
 
     def sha256(self) -> str:
-        """Return the SHA-256 of the bytes that were read, before they were unpacked.
+        """Return the SHA-256 of the bytes as read, before unpacking.
 
         Raises ChangedError if a large file was rewritten since.
         """
@@ -66,7 +66,7 @@ class Source(NamedTuple):
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
-    """Replace folders and patterns with the files that they contain or match, and otherwise keep the order.
+    """Replace folders and patterns by the files that they contain or match, otherwise keeping the order.
 
     Of a folder only databases of solvers are used, and they must belong to one run.
 
@@ -79,7 +79,7 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def open_files(names: Sequence[str]) -> list[Source]:
-    """Read the files of one run: `expand` finds them, `open_source` reads them.
+    """Read the files of one run, which `expand` finds and `open_source` opens.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def open_files(names: Sequence[str]) -> list[Source]:
 
 
 def _open_families(names: Sequence[str]) -> dict[str, Source]:
-    """Open the files that belong to families according to their names; only small parts of these files are read."""
+    """Open the files whose names show that they belong to families; only small parts of these files are read."""
     family = re.compile(_FAMILY)
     in_families = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119  pathlib would slow down start-up
     try:
@@ -122,7 +122,7 @@ def _open_families(names: Sequence[str]) -> dict[str, Source]:
     except OSError as error:
         raise _report_unread(error.filename, error) from None
     for name, source in sources.items():
-        # A later file may be empty, because a solver opens it before it writes a state.
+        # A later file may be empty, because a solver opens it before writing a state to it.
         if not source.data and not name[-1].isdigit():
             raise _report_empty(name)
     return sources
@@ -140,7 +140,7 @@ def _look_at_state(name: str) -> FileState | None:
 
 
 def open_source(name: str) -> Source:
-    """Read a file, or standard input for the name ``-``, and unpack gzip data.
+    """Read a file, or standard input for the name ``-``, and unpack it if it contains gzip data.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _report_empty(name: str) -> FormatError:
 
 
 def _list_files(name: str) -> Sequence[str]:
-    """Return the files that a name stands for: a file and its later files, or the files in a folder or pattern."""
+    """Return the files that a name stands for: a file and its family, all in a folder, or all that match a pattern."""
     # os.path is used instead of pathlib to keep start-up fast.
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113  pathlib would slow down start-up
         return [name, *_list_later_files(name)]
@@ -208,7 +208,7 @@ def _list_later_files(name: str) -> Sequence[str]:
 
 
 def _list_databases(folder: Path) -> list[str]:
-    """Return the solver databases in a folder; raise FormatError unless they belong to one run."""
+    """Return the solver databases in a folder; raise FormatError unless they all belong to one run."""
     runs_of_files = {file: _find_run(file) for file in sorted(folder.iterdir())}
     databases = {file: run for file, run in runs_of_files.items() if run}
     if not databases:
@@ -299,7 +299,7 @@ def _report_unread(name: str, error: OSError | ValueError) -> FormatError:
 
 
 def _suggest_file(name: str) -> str:
-    """Return a question with a similar file name in the folder, or a hint if the name is a time, or an empty string."""
+    """Return a question that suggests a similar file in the folder, or a hint if the name is a time, or ""."""
     seconds = parse_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} if that unit is s"
@@ -315,13 +315,13 @@ def _suggest_file(name: str) -> str:
 
 
 def _unpack(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack gzip data as far as they are complete, within the limits on memory."""
+    """Unpack as much of gzip data as is complete, within the limits on memory."""
     import zlib
 
     data = bytes(packed)
     try:
         if len(data) * bound("RATIO") > bound("UNPACKED"):
-            # The size is checked before memory is used for the data.
+            # The size is checked before memory is allocated for the data.
             _unpack_pieces(name, data, keep=False)
         pieces, cut = _unpack_pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
@@ -362,7 +362,7 @@ def _unpack_pieces(
 
 
 def find_later_legs(names: Sequence[str]) -> list[str]:
-    """Return the later restart segments next to these files that the user did not name."""
+    """Return the later restart segments that lie next to these files and that the user did not name."""
     from pathlib import Path  # Imported here to keep start-up fast.
 
     legs: list[str] = []
@@ -382,7 +382,7 @@ def find_later_legs(names: Sequence[str]) -> list[str]:
 
 
 def _split_leg_number(name: str) -> tuple[str, int]:
-    """Split a file name into its stem and the number of its restart segment; the number is 0 if there is none."""
+    """Split a file name into its stem and the number of its restart segment, which is 0 if there is none."""
     match = _NUMBERED.fullmatch(name)
     # The match is never None, because the pattern matches any text.
     assert match is not None

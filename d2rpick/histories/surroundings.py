@@ -36,19 +36,19 @@ class Surroundings:
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
-        """Return the possible gravity accelerations of given parts, or of the model; None if they are unknown."""
+        """Return the possible gravity accelerations of the given parts, or of the model; None if they are unknown."""
         accelerations = {self.gravity.get(number) for number in _list_ids(parts)}
         return accelerations.pop() if len(accelerations) == 1 else None
 
     def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
-        """Return the supports of given parts, or of the model."""
+        """Return the supports of the given parts, or of the model."""
         supports: list[Support] = []
         for number in _list_ids(parts):
             supports += self.supports.get(number, ())
         return tuple(supports)
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
-        """Return a sentence on the support of given parts, or of the model, at a time; None if there is no support."""
+        """Return a sentence on the support of the given parts, or of the model, at a time; None if there is none."""
         for number in _list_ids(parts):
             for support in self.supports.get(number, ()):
                 if support.start <= time <= support.end:

@@ -1,4 +1,4 @@
-"""Read contact forces from the columns of a table, which are recognised by their names."""
+"""Read contact forces from table columns, which are recognised by their names."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Compute example runs with the package itself: the published oscillator and the rollover box."""
+"""Compute example runs inside the package: the published oscillator and the rollover box."""

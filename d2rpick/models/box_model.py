@@ -1,4 +1,4 @@
-"""Define the box, its step, the sled and the ground at rest, and the forces of the bars.
+"""Define the box, its step, the sled and the ground in their initial state, and the bar forces.
 
 The box is the cross-section of a thin-walled body in its plane of roll: an outer and an inner ring of mass points,
 connected by bars along both rings, across, and diagonally. So its walls bend, the frame racks, and it has twice as
@@ -25,7 +25,7 @@ _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
     "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
-# Smallest number of cells along a side; with fewer cells, the step could not cover a quarter of the leading side.
+# Smallest number of cells along a side; with fewer cells, the step could not span a quarter of the leading side.
 _COARSEST = 4
 # Number of bars per cell. The cells of the leading side are listed first, then the cells of the roof.
 _BARS = 5
@@ -33,7 +33,7 @@ _BARS = 5
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of box, sled and surroundings in SI units; raise RangeError for a value that gives no valid model.
+    """Parameters of the box, sled and surroundings in SI units; raise RangeError for values that give no valid model.
 
     The defaults are a narrow box on the standard dolly. They were tuned to two times of the published study, which
     states no other figure of its model: the trip ends at about 85 ms, and the box lands at 380 ms.
@@ -116,7 +116,7 @@ class Truss(NamedTuple):
         axial: float,
         yield_strain: float,
     ) -> Truss:
-        """Return straight bars with axial stiffness ``axial`` [N] that are free of stress at these points."""
+        """Return straight bars with axial stiffness ``axial`` [N] that are stress-free at these points."""
         pairs = np.array(ends, dtype=np.intp)
         lengths = np.abs(points[pairs[:, 1]] - points[pairs[:, 0]])
         return cls(
@@ -125,7 +125,7 @@ class Truss(NamedTuple):
 
 
 class Structure(NamedTuple):
-    """Points at ``places`` (n,) with ``masses``, the first ``of_box`` of them in the box, and all bars.
+    """Points at ``places`` (n,) with ``masses``, of which the first ``of_box`` belong to the box, and all bars.
 
     The points of the outer ring are listed first. ``skin`` are the points that may touch floor and ground, ``toes`` the
     points that may meet the curb.
@@ -141,7 +141,7 @@ class Structure(NamedTuple):
 
 
 def build_structure(parameters: Parameters) -> Structure:
-    """Return the box and step on the tilted floor of the sled, with the lower end of the step at the curb (the origin).
+    """Return the box and the step on the tilted floor of the sled, with the lower step point at the curb (the origin).
 
     For a drop they are moved vertically to their height above the ground.
     """
@@ -189,7 +189,7 @@ def _make_ring(mesh: int) -> Plane:
 
 
 def _scale_ring(ring: Plane, width: float, height: float) -> Plane:
-    """Return the points of a ring, scaled to a width and height [m]."""
+    """Return the points of a ring, scaled to the given width and height [m]."""
     return ring.real * width + 1j * ring.imag * height
 
 
@@ -208,7 +208,7 @@ def _list_bars_of_box(cells: int) -> list[tuple[int, int]]:
 
 
 def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
-    """Return the bars of the step: between its two points, and from each to nearby points of skin and interior."""
+    """Return the bars of the step: one between its two points, and four from each of them to nearby box points."""
     low = 2 * cells
     high = 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]
@@ -223,7 +223,7 @@ def _list_bars_of_step(cells: int, top: int) -> list[tuple[int, int]]:
 
 
 class Bars:
-    """The current state of the bars of a truss: lengths at ``rest`` with plastic elongation [m], ``plastic_work`` [J].
+    """The current state of the bars of a truss: lengths ``rest`` with plastic elongation [m], and ``plastic_work`` [J].
 
     ``points`` is the number of points of the model. A bar depends only on its length, so after a phase in which its
     points moved as one body it continues with the elongation it had, rotated with the body.
@@ -234,7 +234,7 @@ class Bars:
         self._stiffness, self._strength = truss.stiffness, truss.strength
         self.rest = truss.rest.copy()
         self.plastic_work = 0.0
-        # A bar under tension pulls its first point towards its second point, and the second towards the first.
+        # A bar in tension pulls its first point towards its second point, and its second point towards its first.
         self._pulls = np.zeros((points, truss.rest.size))
         self._pulls[self._first, np.arange(truss.rest.size)] = 1.0
         self._pulls[self._second, np.arange(truss.rest.size)] = -1.0
@@ -260,7 +260,7 @@ class Bars:
         )
 
     def elastic_energy(self, positions: Plane, rest: Values | None = None) -> Values:
-        """Return the elastic energy of the bars [J], shape (...) for ``positions`` of shape (..., n).
+        """Return the elastic energy of the bars, shape (...), for ``positions`` of shape (..., n) [J].
 
         ``rest`` are the lengths at rest at that time, if they differ from the current lengths (..., bars) [m].
         """
@@ -274,7 +274,7 @@ class Bars:
         rest: Values | None = None,
         plastic_work: Values | None = None,
     ) -> Values:
-        """Return the elastic energy plus plastic work of the current or a past state [J], shape (...)."""
+        """Return the sum of elastic energy and plastic work in the current or a past state, shape (...) [J]."""
         return self.elastic_energy(positions, rest) + (
             self.plastic_work if plastic_work is None else plastic_work
         )

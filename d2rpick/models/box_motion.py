@@ -1,4 +1,4 @@
-"""Integrate the motion of the box by central differences, with contact, as bars or as one rigid body.
+"""Integrate the motion of the box by central differences, with contact, as a truss or as one rigid body.
 
 The contact force is proportional to the penetration; friction follows Coulomb's law, smoothed at small speeds. The
 cushion of the curb crushes like honeycomb: at a constant force, irreversibly, until its depth is used up. In a drop
@@ -27,26 +27,26 @@ from d2rpick.models.box_model import (
     compute_stiffest_rate,
 )
 
-# Stiffness of floor and curb at one point [N/m]; it is lower than that of the box so as not to limit the time step.
-# The weight of the box causes a penetration of 0.5 mm into a floor of this stiffness.
+# Contact stiffness of the floor and the curb per point [N/m]; it is lower than the stiffness of the box.
+# This stiffness does not limit the time step; the weight of the box causes a penetration of 0.5 mm.
 STIFFNESS = 5e5
 # Sliding speed below which friction is proportional to the speed [m/s].
-# Typical sliding speeds are 100 times as high as SLIP.
+# Typical sliding speeds are 100 times the value of SLIP.
 SLIP = 0.1
-# Largest depth below the floor of a point that touches the floor [m]; deeper points have left the sled.
+# A point up to this depth below the floor [m] touches the floor; deeper points have left the sled.
 DEEPEST = 0.1
-# Thickness of the curb, which is the end of the sled [m].
+# Thickness of the curb at the end of the sled [m].
 CURB_THICKNESS = 0.05
-# No point moves faster than FASTEST times the initial speed, plus FALL, plus twice the speed of the drop [m/s].
-# From the largest speed of any point follows a time within which no point can reach the floor, the curb or the ground.
+# No point moves faster than FASTEST times the initial speed plus FALL plus twice the drop speed [m/s].
+# The largest possible speed gives the time within which no point can reach the floor, the curb or the ground.
 # FALL is the speed of a point after a fall of 1 m [m/s].
 FASTEST, FALL = 4.0, 5.0
-# Largest time between contact forces that belong to the same contact [s]; it is positive, because corners rattle.
+# Longest gap between contact forces of the same contact [s]; such gaps occur because corners rattle.
 SAME_CONTACT = 2e-3
 
-# Safety factor on the time-step limit 2/omega [-], which is exact only for linear bars without contact.
+# Safety factor on the stable time step 2/omega [-], which is exact only for linear bars without contact.
 _SAFETY = 0.9
-# Largest excess of a time over a whole number of time steps that is rounded down, as a fraction of a step [-].
+# Times that exceed a whole number of time steps by at most this fraction of a time step are rounded down [-].
 _SAME = 1e-6
 
 
@@ -58,12 +58,12 @@ class Face(NamedTuple):
 
     @property
     def whole(self) -> Plane:
-        """The sum of normal force and friction."""
+        """The sum of the normal force and the friction force."""
         return self.normal + self.friction
 
 
 class Push(NamedTuple):
-    """The forces of the sled and of the ground on all points."""
+    """The forces of the sled and the ground on all points."""
 
     sled: Face
     ground: Face
@@ -91,7 +91,7 @@ class Sled:
 
 
 class Contact:
-    """The contact forces on the points of a structure, with the crushed depth of the cushion as state.
+    """The contact forces on the points of a structure; the crushed depth of the cushion is kept as state.
 
     ``released`` is the last time at which the sled pushed before the first contact with the ground; ``landings`` are
     the intervals (start, end) in which the ground pushed [s].
@@ -114,7 +114,7 @@ class Contact:
         self.landings: list[tuple[float, float]] = []
 
     def push(self, time: float, positions: Plane, velocities: Plane) -> Push | None:
-        """Return the forces at ``time``; None while no contact is possible."""
+        """Return the forces at ``time``, or None while no contact is possible."""
         if time < self._sleeps_until:
             return None
         on_sled = (positions - self.sled.place(time)) * self._into_sled
@@ -153,13 +153,13 @@ class Contact:
         )
 
     def _on_all(self, face: Face, points: Ends) -> Face:
-        """Return forces on selected points as an array for all points, with zeros for the others."""
+        """Return forces on selected points as an array for all points; the other points get zero forces."""
         forces = np.zeros((2, self._points), dtype=np.complex128)
         forces[:, points] = face
         return Face(*forces)
 
     def _gap(self, positions: Plane, on_sled: Plane) -> float:
-        """Return the distance of the nearest point from floor, curb and ground [m]."""
+        """Return the distance from the floor, the curb and the ground to the nearest point [m]."""
         to_ground = float(positions[self._skin].imag.min()) + self._p.ground
         if self._p.drop is not None:
             return to_ground
@@ -183,7 +183,7 @@ class Contact:
         )
 
     def _curb(self, positions: Plane, sliding: Plane) -> Face:
-        """Return the forces of the curb along -x [N], with friction along z, like those of a rotated floor."""
+        """Return the forces of the curb along -x [N], with friction along z; the curb acts like a floor set upright."""
         may_touch = (positions.imag < self._p.curb) & (
             positions.real < self._p.cushion_depth + DEEPEST
         )
@@ -198,13 +198,13 @@ class Contact:
         return Face(np.asarray(1j * face.normal), np.asarray(1j * face.friction))
 
     def _with_friction(self, normal: Values, sliding: Values) -> Face:
-        """Return the forces of a floor [N]: ``normal`` upwards, and friction along it against ``sliding`` [m/s]."""
+        """Return the forces of a floor [N]: ``normal`` upwards, and friction against the velocity ``sliding`` [m/s]."""
         friction = self._p.friction * normal * sliding / np.hypot(sliding, SLIP)
         return Face(np.asarray(1j * normal), np.asarray(-friction, dtype=np.complex128))
 
 
 class RigidPoints:
-    """Points that move as one rigid body, which keeps the momenta that they had at the switch.
+    """Points that move as one rigid body, which starts with the momenta of the points at the switch.
 
     ``arms`` from the centre of mass to the points, rotated with the body (n,) [m]; ``velocity`` of the centre [m/s];
     ``spin`` from x to z [rad/s].
@@ -225,12 +225,12 @@ class RigidPoints:
 
     @property
     def velocities(self) -> Plane:
-        """Velocities of the points [m/s]."""
+        """Velocities of the points [m/s], from the velocity and spin of the body."""
         return self.velocity + 1j * self.spin * self.arms
 
     def push(self, forces: Plane, damping: float, dt: float) -> None:
-        """Advance velocity and spin by a time step [s] under the forces on the points (n,) [N] and damping [1/s]."""
-        # Damping acts on the mean of the velocities before and after the step.
+        """Advance velocity and spin by one time step [s] under the forces (n,) [N] on the points and damping [1/s]."""
+        # Damping acts on the mean of the velocities before and after the time step.
         half = damping * dt / 2
         kick = dt * complex(forces.sum()) / self._mass
         moment = float(np.vdot(self.arms, forces).imag)
@@ -239,14 +239,14 @@ class RigidPoints:
         self.spin = ((1 - half) * self.spin + turn) / (1 + half)
 
     def move(self, dt: float) -> None:
-        """Move the body by a time step [s]; the arms rotate and keep their lengths."""
+        """Move the body by one time step [s]; the arms to the points rotate but keep their lengths."""
         self.centre += dt * self.velocity
         self.arms *= complex(np.exp(1j * dt * self.spin))
 
 
 @dataclass
 class Accounts:
-    """Energy and momentum exchanged with the surroundings since time 0.
+    """Energy and momentum exchanged with the surroundings since time zero.
 
     ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the ``walls`` (stored in
     floor, curb and ground, and dissipated by the cushion), ``damping`` energy, ``lost`` kinetic energy of the
@@ -264,7 +264,7 @@ class Accounts:
 
 
 class BoxMotion:
-    """The state of a run: ``places`` (n,) at the time step ``count``, ``velocities`` (n,) half a time step earlier.
+    """The state of a run: ``places`` (n,) at time step ``count``, ``velocities`` (n,) half a time step earlier.
 
     A time step ``dt`` [s] is 1/``every`` of the output ``interval``; RangeError is raised if impossible. ``body`` is
     the rigid body while there is one, else None; it contains the points of the box, and those of the step if the step
@@ -299,7 +299,7 @@ class BoxMotion:
 
     @property
     def time(self) -> float:
-        """Time of the positions [s]."""
+        """Time at which the positions apply [s]."""
         return self.count * self.dt
 
     def step_at(self, time: float) -> int:
@@ -317,7 +317,7 @@ class BoxMotion:
         """
         frozen_bars = (self.box, self.step) if with_step else (self.box,)
         self._deformable_bars = () if with_step else (self.step,)
-        # The forces are evaluated once more, so that bars yield before they are frozen.
+        # The forces are evaluated again so that bars yield before they are frozen.
         for bars in frozen_bars:
             bars.forces(self.places)
         s = self.structure
@@ -359,7 +359,7 @@ class BoxMotion:
         return mean
 
     def move(self) -> None:
-        """Move the points by a time step."""
+        """Move the points by one time step."""
         self.places = self.places + self.dt * self.velocities
         if self.body:
             points = self._rigid_points
@@ -369,7 +369,7 @@ class BoxMotion:
         self.count += 1
 
     def _account(self, mean: Plane, outer: Plane, push: Push | None) -> None:
-        """Add the external work and impulse of a time step, computed with the mean velocities over the step."""
+        """Add the external work and impulse of one time step, computed from the mean velocities over the time step."""
         accounts = self.accounts
         dt = self.dt
         momenta = self.structure.masses * mean

@@ -1,4 +1,4 @@
-"""Compute runs of the box from start to end, switched or not, their records, and scans over tr."""
+"""Compute complete box runs, switched or not, their histories, and scans over tr."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
-# Number of states for which results are computed at once, because calling numpy for single states would be slow.
+# Number of states whose results are computed at once, because calling numpy for single states would be slow.
 _BLOCK: Final = 256
 
 # Default output interval [s], which gives 25 states per period of a 400 Hz mode.
 INTERVAL = 1e-4
-# Largest number of time steps, which take minutes; a request for more is probably a mistake.
+# Largest number of time steps, which takes minutes to compute; a request for more is probably a mistake.
 MOST_STEPS = 5_000_000
-# _FINE: interval between values of tr in a scan while the load may last [s].
-# _COARSE: interval between values of tr in the flight [s]; it gives six values per energy period of 25 ms.
-# _LAST: duration before td in which no tr is scanned [s].
+# _FINE: interval between the tr values of a scan while the load may still act [s].
+# _COARSE: interval between the tr values during the flight [s]; it gives six values per energy period of 25 ms.
+# _LAST: time before td in which no tr is tried [s].
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
 class Record(NamedTuple):
-    """States of a run over ``time`` (n,) in SI units; vectors are complex numbers x + i z.
+    """States of a run at the times ``time`` (n,) in SI units; vectors are complex numbers x + i z.
 
     Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s]
     from the angular momentum. Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2). Of
@@ -75,12 +75,12 @@ class Record(NamedTuple):
 
     @property
     def landed(self) -> float | None:
-        """Time of the first contact force of the ground [s]; None if the box does not touch the ground."""
+        """Time of the first contact force from the ground [s]; None if the box does not touch the ground."""
         return self.landings[0][0] if self.landings else None
 
     @property
     def total_energy(self) -> Values:
-        """Sum of current and dissipated energy, shape (n,) [J], as in a solver, but without the energy lost at tr."""
+        """Sum of current and dissipated energy, shape (n,) [J]; like a solver, it omits the energy lost at tr."""
         present = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
         return np.asarray(
             present + self.friction_energy + self.wall_energy + self.damping_energy
@@ -88,7 +88,7 @@ class Record(NamedTuple):
 
     @property
     def energy_ratio(self) -> Values:
-        """Ratio of the total energy to the sum of initial energy and external work, shape (n,) [-]; 1 if both are 0."""
+        """Ratio of the total energy to the initial energy plus external work, shape (n,) [-]; 1 if both are 0."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
         return np.asarray(
             np.divide(
@@ -110,7 +110,7 @@ class Record(NamedTuple):
 
 
 class Recorder:
-    """Collects states of a ``motion`` up to its time step ``last``."""
+    """Collects the states of a ``motion`` up to its time step ``last``."""
 
     def __init__(self, motion: BoxMotion, last: int) -> None:
         self._motion, self._began, self._updates = (
@@ -135,7 +135,7 @@ class Recorder:
         ]
 
     def note(self, mean: Plane) -> None:
-        """Store the state of the motion, with the velocities ``mean`` (n,) [m/s] over the time step around it."""
+        """Store the state of the motion, with the mean velocities ``mean`` (n,) over the time step around it [m/s]."""
         motion = self._motion
         accounts = self._motion.accounts
         at = self._next % _BLOCK
@@ -150,7 +150,7 @@ class Recorder:
             self._work_out()
 
     def _work_out(self) -> None:
-        """Compute the results of the states stored since the last full block."""
+        """Compute the results of the states stored since the last complete block."""
         count = (self._next - 1) % _BLOCK + 1
         states = slice(self._next - count, self._next)
         s = self._motion.structure
@@ -222,13 +222,13 @@ class Recorder:
 
 
 def _count_updates(motion: BoxMotion) -> int:
-    """Return the number of evaluations of bar forces so far."""
+    """Return how often bar forces have been evaluated so far."""
     return motion.box.evaluations + motion.step.evaluations
 
 
 @dataclass(frozen=True)
 class RigidWindow:
-    """The interval from ``tr`` to ``td`` [s] in which the box is rigid, alone or ``with_step`` as one body.
+    """The interval from ``tr`` to ``td`` [s] in which the box is rigid, alone or joined to the step (``with_step``).
 
     Raises RangeError unless 0 <= tr <= td.
     """
@@ -250,7 +250,7 @@ def simulate(
     *windows: RigidWindow,
     interval: float = INTERVAL,
 ) -> Record:
-    """Compute a run from 0 to ``t_end`` with a state every ``interval`` [s].
+    """Compute a run from 0 to ``t_end`` that stores a state every ``interval`` [s].
 
     Raises RangeError if it takes too many time steps, or if ``windows`` overlap or are not in order.
 
@@ -261,7 +261,7 @@ def simulate(
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    # Overflow warnings are suppressed, because an overflow would make the number of time steps too large below.
+    # Overflow warnings are suppressed; an overflow appears as too many time steps, which are rejected below.
     with np.errstate(over="ignore"):
         motion = BoxMotion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
@@ -284,7 +284,7 @@ def continue_motion(motion: BoxMotion, t_end: float, *windows: RigidWindow) -> R
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid = {motion.step_at(window.tr): window for window in windows}
     deformable = {motion.step_at(window.td) for window in windows}
-    # Floating-point warnings are suppressed, because the recorder raises an error for infinite numbers.
+    # Floating-point warnings are suppressed, because the recorder raises an error for non-finite numbers.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         recorder = Recorder(motion, last)
         while True:
@@ -309,7 +309,7 @@ def run_to(motion: BoxMotion, time: float) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BoxEvidence(Given):
-    """The momenta of box and step, and the internal energy of each, as the ``matsum`` of a run contains them.
+    """The momentum and the internal energy of the box and of the step, as in the ``matsum`` of a run.
 
     ``part_energies`` holds the energies, ``values`` of shape (n, 2) [J].
     """
@@ -317,7 +317,7 @@ class BoxEvidence(Given):
     part_energies: Track | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
-        """Return internal energies of box or step, ``values`` of shape (n, parts) [J]."""
+        """Return the internal energies of the box or the step, with ``values`` of shape (n, parts) [J]."""
         if self.part_energies is None:
             return None
         time, values = self.part_energies
@@ -325,7 +325,7 @@ class BoxEvidence(Given):
 
 
 def make_history(record: Record) -> History:
-    """Return the history of the energy of the box, with the momenta and energies of both parts."""
+    """Return the history of the box energy, with the momenta and energies of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
     momentum = np.stack(
         [record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2
@@ -366,7 +366,7 @@ class Outcome(NamedTuple):
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Return times for tr up to td [s], dense until 1.5 times the end of the load, and then resolving the vibration.
+    """Return the tr values up to td [s], closely spaced until 1.5 times the end of the load and then more widely.
 
     Raises RangeError if td leaves no time for tr.
     """
@@ -399,7 +399,7 @@ def scan(
     td: float,
     jobs: int | None = None,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of a switched run for each of ``times``, in the order of tr.
+    """Yield the outcome of a switched run for each of ``times``, in ascending order of tr.
 
     All runs equal the reference run until their tr, so that part is computed only once.  Then ``jobs`` processes share
     the runs (None: one process for each core; 1: only this process).
@@ -442,7 +442,7 @@ def _compute_switched_run(branch: tuple[BoxMotion, float, RigidWindow]) -> Recor
 def compare_box_runs(
     reference: Record, switched: Record, tr: float, td: float
 ) -> Outcome:
-    """Compare a switched run, which may begin at tr, with the reference run at td and from td to the landing."""
+    """Compare a switched run, which may begin at tr, with the reference run at td and between td and the landing."""
     interval = _find_interval(reference)
     at = round(td / interval)
     end = round(find_comparison_end(reference, td) / interval)

@@ -1,4 +1,4 @@
-"""Write the result of ``calibrate`` as a table, JSON, CSV, Markdown, and the TOML file for ``--weights``."""
+"""Write the result of ``calibrate`` as a table, JSON, CSV or Markdown, and as the TOML file for ``--weights``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
 def as_table(calibration: FittedWeights, display: DisplayOptions) -> str:
-    """Return a table of the assumed and measured weights of each formulation, and of the restart segments used."""
+    """Return a table of the assumed and fitted weight of each formulation, and a table of the restart segments used."""
     weights = calibration.weights
     lines = [
         tables.as_text(HEAD, _list_weight_rows(calibration), display.width), "",

@@ -29,7 +29,7 @@ def list_verdict_lines(decision: Decision, tr: float, td: float) -> Lines:
 
 
 def describe_expectation(decision: Decision) -> str:
-    """Return the expected error after td, and the largest possible error, as text."""
+    """Return the expected error after td and the largest possible error as text."""
     worst = decision.worst_case
     if worst == "the same":
         return decision.expected
@@ -37,7 +37,7 @@ def describe_expectation(decision: Decision) -> str:
 
 
 def list_statements(decision: Decision) -> Lines:
-    """Return a sentence on the motion and a sentence on the vibration, without what the verdict already states."""
+    """Return a sentence on the motion and a sentence on the vibration, omitting what the verdict already states."""
     motion = decision.quality.motion
     vibration = decision.quality.vibration
     alone = decision.quality.alone
@@ -61,7 +61,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
     if not causes:
         return ""
     reasons = "; ".join(cause.reason for cause in causes)
-    # A better pair is the cure that the verdict names.
+    # A better pair is a cure that the verdict already names.
     curable = [
         cause
         for cause in causes
@@ -76,7 +76,7 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
 
 
 def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
-    """Number the reasons why verdicts are not better, so that each reason is explained only once below a table."""
+    """Assign a number to each reason why a verdict is no better; each reason is explained once below a table."""
     reasons = (
         decision.general_reason for decision in decisions if decision.grade != GOOD
     )
@@ -86,7 +86,7 @@ def number_reasons(decisions: Iterable[Decision]) -> dict[str, int]:
 
 
 def format_with_number(decision: Decision, numbers: Mapping[str, int]) -> str:
-    """Return the verdict with the number of the reason why it is not better."""
+    """Return the verdict with the number of the reason why it is no better."""
     if decision.grade == GOOD:
         return decision.verdict
     return f"{decision.verdict} ({numbers[decision.general_reason]})"
@@ -128,5 +128,5 @@ def format_saving(best: Candidate) -> str | None:
 
 
 def format_saved_share(run_time_share: float) -> str:
-    """Return how much CPU time is saved if the run takes the fraction ``run_time_share`` of the CPU time."""
+    """Return the CPU time saved as text, for a run that takes the fraction ``run_time_share`` of the CPU time."""
     return f"about {1 - run_time_share:.0%} of the CPU time"

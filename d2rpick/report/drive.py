@@ -50,7 +50,7 @@ def as_table(answer: Driven, display: DisplayOptions) -> str:
 
 
 def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and rows of the flights, with the time for which the parts were deformable."""
+    """Return the column names and rows for the flights, including the time for which the parts were deformable."""
     columns = {
         "flight": lambda window: window.free,
         "wait": lambda window: f"{window.wait:.4g}",
@@ -73,7 +73,7 @@ def list_window_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]
 
 
 def list_leg_rows(answer: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and the rows of the restart segments, with one row per kind of segment."""
+    """Return the column names and rows for the restart segments, one row for each type of segment."""
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(leg.order.kind for leg in answer.legs):
         legs_of_kind = [leg for leg in answer.legs if leg.order.kind == kind]

@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of intervals whose lowest and highest energies are drawn, in the view and in the overview.
+# Number of intervals of a curve in the view and in the overview; the lowest and highest energy in each are drawn.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-# Separator between the section, the chart of the motion and the values of a pair in ``explorer.html``.
+# Separator between the three parts of ``explorer.html``: the section, the motion chart and the values of a pair.
 _NEXT: Final = "<!-- next -->"
 
 # Labels of the values shown for a pair, keyed by value name and in display order.
@@ -68,9 +68,9 @@ _VALUES: Final[Mapping[str, str]] = {
     "windows": "admissible tr",
     "reason": "no tr",
 }
-# Number of columns into which the view is divided to draw windows of acceptable tr; it must be a multiple of 8.
+# Number of columns of the view that show windows of acceptable tr; the number must be a multiple of 8.
 _COLUMNS: Final = 480
-# Number of significant digits with which a difference is shown.
+# Number of significant digits of a displayed difference.
 _READ: Final = 3
 
 
@@ -142,12 +142,12 @@ def build_explorer(explored: Explorer | None) -> Markup:
 
 
 def _strip_whitespace(text: str) -> str:
-    """Remove whitespace between elements, and reduce whitespace within a string to one blank."""
+    """Remove whitespace between elements, and collapse whitespace within strings to a single space."""
     return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
 
 
 def _build_data_element(name: str, content: Any) -> Markup:
-    """Return a data element for a script: JSON without anything that could be mistaken for markup."""
+    """Return an HTML element that holds data for a script, as JSON without anything that could be read as markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
@@ -206,7 +206,7 @@ def _describe_flight(trade_off: TradeOff) -> dict[str, Any]:
 
 
 def _list_motion_curves(situation: Situation) -> dict[str, Any] | None:
-    """Return the curves from which the script composes the deformation; None if no oscillator is known."""
+    """Return the curves from which the script computes the deformation; None if no oscillator is known."""
     motion = compute_response(situation)
     if motion is None:
         return None
@@ -222,12 +222,12 @@ def _list_motion_curves(situation: Situation) -> dict[str, Any] | None:
 
 
 def _round_curve(values: Samples) -> list[float]:
-    """Round the values of a curve to six digits."""
+    """Round the values of a curve to six significant digits."""
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
 def _build_offer_table(trade_off: TradeOff, first: Offer, view: View) -> dict[str, Any]:
-    """Return one row per td, with a common header: ``numbers`` are drawn as curves, ``texts`` are shown next to them.
+    """Return one row per td and a common header; ``numbers`` are drawn as curves, and ``texts`` are shown next to them.
 
     ``first`` is the offer whose td is shown first; the others are compared with it.
     """
@@ -276,7 +276,7 @@ def _compute_saved_percentage(offer: Offer) -> float | None:
 
 
 def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
-    """Mark the columns of the view that windows touch: a bit mask in hexadecimal digits, empty without windows.
+    """Mark the view columns that windows touch, as a bit mask in hexadecimal digits; empty if there are no windows.
 
     The mask has the same length for any number of windows, of which noise makes many, and is finer than a screen.
     """
@@ -295,19 +295,19 @@ def _mark_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
 
 
 def _round_number(value: float | None) -> float | None:
-    """Round a number that is drawn but not printed."""
+    """Round a number that is drawn rather than printed."""
     return None if value is None else float(f"{value:.6g}")
 
 
 def _name_error(offers: Sequence[Offer]) -> str:
-    """Return the name of the error by which the proposed pairs are compared."""
+    """Return the name of the error that is used to compare the proposed pairs."""
     if all(offer.basis == "energy" for offer in offers):
         return "shortfall of the level at td"
     return "residual"
 
 
 def _name_saving(offers: Sequence[Offer]) -> str:
-    """Return the label of the saving: saved CPU time, or the rigid time if the cost of the parts is unknown."""
+    """Return the label of the saving: CPU time or, if the cost of the parts is unknown, rigid time."""
     is_cost_known = any(offer.saving is not None for offer in offers)
     if is_cost_known:
         return "saved, % of the CPU time"
@@ -317,7 +317,7 @@ def _name_saving(offers: Sequence[Offer]) -> str:
 def _list_texts(
     offer: Offer, decision: Decision | None, start: Offer, unit: str
 ) -> dict[str, str | None]:
-    """Return all texts shown for a td, worded like those of ``suggest --td``; None for unknown values."""
+    """Return all texts shown for a td, in the words of ``suggest --td``; None for unknown values."""
     best = offer.best
     return {
         "td": format_short(offer.td),

@@ -1,4 +1,4 @@
-"""Define the fields of results: the kind, the meaning and the source of the value of each key.
+"""Define the fields of results: the type, the meaning and the source of the value for each key.
 
 A row of fields determines the JSON of an object, its CSV row, the columns of a frame, and the schemas in
 ``d2rpick/schemas``.  Keys are only ever added.
@@ -15,7 +15,7 @@ from d2rpick.report import tables
 
 
 class Kind(NamedTuple):
-    """A type of field values: ``schema`` is its JSON schema, ``plain`` converts a value to JSON.
+    """A type of values: ``schema`` is its JSON schema, and ``plain`` converts a value to JSON.
 
     Within ``schema``, other kinds are replaced by their schemas.  A kind with a ``name`` becomes a definition to which
     others refer.  The kind of an object (a row) has ``fields`` in display order.
@@ -34,7 +34,7 @@ class Kind(NamedTuple):
     def of_part(
         self, part: Callable[[Any], Any], keys: Iterable[str] = ()
     ) -> list[Field]:
-        """Return the fields with these ``keys``, or all fields, read from the object that ``part`` returns."""
+        """Return the fields with these ``keys``, or all fields; ``part`` returns the object that has their values."""
         return [_read_from_part(self.field(key), part) for key in (keys or self.keys)]
 
     def field(self, key: str) -> Field:
@@ -42,7 +42,7 @@ class Kind(NamedTuple):
         return next(field for field in self.fields if field.key == key)
 
 
-# Kinds of values that many fields use. A question mark means that None is allowed. A "size" is a number >= 0.
+# Types that many fields use. A question mark means that None is allowed. A "size" is a number >= 0.
 Name = Literal[
     "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
     "span?",
@@ -50,7 +50,7 @@ Name = Literal[
 
 
 class Field(NamedTuple):
-    """A key with its kind and meaning; ``get`` returns its value, by default the attribute with the key's name.
+    """A key with the type and meaning of its value; ``get`` returns the value, by default the attribute of that name.
 
     ``later`` is True if the field was added after the first schema, so that older results may lack it.
     """
@@ -62,7 +62,7 @@ class Field(NamedTuple):
     later: bool = False
 
     def of(self, thing: Any) -> Any:
-        """Return the value of this field in an object, converted to its JSON form."""
+        """Return the value of this field in an object, converted to JSON."""
         return get_kind(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
@@ -87,7 +87,7 @@ def row(
     closed: bool = False,
     **keywords: Any,
 ) -> Kind:
-    """Make the kind of an object with these fields. An object that is ``closed`` allows no other keys.
+    """Make the type of an object with these fields. If it is ``closed``, the object has no other keys.
 
     Results of older versions may lack the keys in ``later``; other ``keywords`` are added to the schema unchanged.
 
@@ -116,7 +116,7 @@ def row(
 
 
 def get_kind(kind: Kind | Name, **limits: Any) -> Kind:
-    """Return a kind by its name, with limits as in JSON schema, such as ``minimum=0``."""
+    """Return a type by its name, with limits as in JSON schema, such as ``minimum=0``."""
     named_kind = _KINDS[kind] if isinstance(kind, str) else kind
     if limits:
         return Kind({**named_kind.schema, **limits}, named_kind.plain, named_kind.name)
@@ -124,7 +124,7 @@ def get_kind(kind: Kind | Name, **limits: Any) -> Kind:
 
 
 def maybe(kind: Kind | Name) -> Kind:
-    """Return a kind that also allows None, for values that may be unknown."""
+    """Return a type that also allows None, for values that may be unknown."""
     kind = get_kind(kind)
     schema = kind.schema
     if None in schema.get("enum", ()) or "null" in schema.get("type", ()):
@@ -141,7 +141,7 @@ def maybe(kind: Kind | Name) -> Kind:
 
 
 def many(kind: Kind | Name) -> Kind:
-    """Return the kind of an array of values of the given kind."""
+    """Return the type of an array whose values have the given type."""
     item_kind = get_kind(kind)
     return Kind(
         {"type": "array", "items": item_kind},
@@ -150,12 +150,12 @@ def many(kind: Kind | Name) -> Kind:
 
 
 def each(kind: Name) -> Kind:
-    """Return the kind of an object with arbitrary keys whose values all have the given kind."""
+    """Return the type of an object with arbitrary keys whose values all have the given type."""
     return Kind({"type": "object", "additionalProperties": get_kind(kind)}, dict)
 
 
 def one_of(*names: str) -> Kind:
-    """Return a kind that allows only the words in ``names``."""
+    """Return a type that allows only the words in ``names``."""
     return Kind({"enum": list(names)})
 
 
@@ -176,7 +176,7 @@ _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.i
 
 
 class Document(NamedTuple):
-    """A result as JSON: the ``name`` of its schema, a description, and the fields after schema, version and command.
+    """A result as JSON: schema ``name``, description, and the fields after "schema", "tool_version" and "command".
 
     Objects of a ``closed`` document have no other keys.  ``also`` lists objects of other forms of the result, which the
     schema defines too.
@@ -190,7 +190,7 @@ class Document(NamedTuple):
 
     @property
     def whole(self) -> Kind:
-        """The kind of an object with all fields of the document."""
+        """The type of an object with all fields of the document."""
         head = (
             Field("schema", Kind({"const": self.name})),
             Field("tool_version", "text"),

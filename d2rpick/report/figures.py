@@ -42,23 +42,23 @@ NEUTRAL: Final = "#595959"
 WIDTH: Final = 10.0
 # Largest width of the label of a switch time, as a fraction of the axes [-]; the key is True for a page.
 LABEL: Final = {False: 0.14, True: 0.28}
-# Smallest ratio of largest to smallest value at which a logarithmic axis has marks at powers of ten only [-].
+# A logarithmic axis has marks only at powers of ten if its largest value exceeds this multiple of its smallest [-].
 _DECADES: Final = 100.0
 # Number of intervals into which a curve is divided; only the lowest and highest value in each are drawn.
 STRETCHES: Final = 400
-# Largest number of letters of a name in a legend; longer names from files are shortened.
+# Largest number of letters in a legend name; longer names from files are shortened.
 _LONGEST_NAME = 28
 
-# Width of a figure on a page [inch], chosen so that its letters on a phone are as large as those of the text.
+# Width of a figure on a page [inch]; at this width, its letters are as large as the text on a phone.
 PAGE_WIDTH: Final = 4.5
 # _TOP: space above the panels for the labels of the switch times [inch].
 # _BETWEEN: space between two panels [inch].
 # _RIGHT: space to the right of the panels for half of the last number on the time axis [inch].
 # _BELOW: space below the panels for the time axis [inch].
-# _LINE: height of a line of the legend [inch].
-# _EDGE: space next to the name of the vertical axis [inch].
+# _LINE: height of a legend line [inch].
+# _EDGE: horizontal space next to the label of the vertical axis [inch].
 _TOP, _BETWEEN, _RIGHT, _BELOW, _LINE, _EDGE = 0.3, 0.12, 0.2, 0.5, 0.19, 0.05
-# Height of the letters of an axis name [inch].
+# Height of the letters in an axis label [inch].
 _NAME: Final = 0.16
 _COLUMNS: Final = 2
 # Largest number of labels on the time axis.
@@ -73,7 +73,7 @@ class Figure(figures.Figure):
 
 
 def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]:
-    """Create a figure with axes below each other and a common time axis; ``height`` is its height in a file [inch]."""
+    """Create a figure whose axes are stacked and share the time axis; ``height`` is its height in a file [inch]."""
     figure = Figure(figsize=(WIDTH, height), layout=None if page else "constrained")
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
@@ -123,14 +123,14 @@ def render(figure: figures.Figure, name: str) -> bytes:
 
 @contextmanager
 def ignore_missing_letters() -> Iterator[None]:
-    """Draw letters missing in the font as boxes, and suppress the warning about them."""
+    """Draw letters missing from the font as boxes, and suppress the warning about them."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
 
 
 def make_logarithmic(axes: Axes, low: float, high: float) -> None:
-    """Make the vertical axis logarithmic, with plain numbers, because typesetting powers would take much time."""
+    """Make the vertical axis logarithmic, with plain numbers, because powers are slow to typeset."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     if high > _DECADES * low:
@@ -145,7 +145,7 @@ def show_span(
     scale: Scale,
     above: Sequence[tuple[str, float]],
 ) -> None:
-    """Show the times in ``span`` of a curve, and mark where values above the scale are cut off.
+    """Show a curve at the times in ``span``, and mark where its values are cut off above the scale.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def show_span(
     for peak_name, highest in above:
         if highest <= scale.high:
             continue
-        # The mark of the load is on the left, and the mark of the landing is on the right.
+        # The note on the load is on the left, and the note on the landing is on the right.
         early = peak_name == "load"
         note(
             axes,
@@ -180,7 +180,7 @@ def show_span(
 def mark_times(
     panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool
 ) -> None:
-    """Mark the switch times. Their labels are above the first axes, clear of each other and of the edges.
+    """Mark the switch times. Their labels are above the first axes and overlap neither each other nor the edges.
 
     A label that would cross an edge moves to the other side of its line if there is room.
     """
@@ -217,7 +217,7 @@ def mark_times(
 
 
 def format_axes(axes: Axes, *, legend: bool = True) -> None:
-    """Draw the grid, limit the time axis to the data, and put the legend next to the axes.
+    """Draw the grid, limit the time axis to the data, and place the legend next to the axes.
 
     The common power of ten is printed above the axes, where it does not touch the labels of the switch times.
     """
@@ -229,7 +229,7 @@ def format_axes(axes: Axes, *, legend: bool = True) -> None:
 
 
 def _collect_legend_entries(panels: Sequence[Axes]) -> dict[str, Artist]:
-    """Return the legend entries of several panels, each name only once."""
+    """Return the legend entries of several panels, each name once."""
     panel_entries = (
         zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels
     )
@@ -242,7 +242,7 @@ def add_legend_below(
     columns: int = 4,
     size: str | None = "small",
 ) -> None:
-    """Put one legend for all panels below them."""
+    """Place one legend for all panels below the panels."""
     if entries := _collect_legend_entries(panels):
         figure.legend(
             entries.values(),
@@ -255,7 +255,7 @@ def add_legend_below(
 
 
 def add_unit(name: str, unit: str) -> str:
-    """Return the label of a time axis, with the unit that a file names, or else "units of the run"."""
+    """Return the label of a time axis, with the unit named in a file, otherwise "units of the run"."""
     return f"{name} [{make_plain_text(unit)}]" if unit else f"{name} (unit of the run)"
 
 
@@ -271,7 +271,7 @@ def make_plain_text(name: str) -> str:
 
 
 def place_panels(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
-    """Arrange panels of one ``height`` [inch] below each other, and a common legend below the last panel.
+    """Stack panels of one ``height`` [inch], with a common legend below the last panel.
 
     Margins are measured once, from the numbers on the vertical axes; a layout engine would draw the figure three times.
     """
@@ -319,7 +319,7 @@ def _place(
 
 
 def render_svg_element(figure: figures.Figure, prefix: str) -> str:
-    """Return a figure as an SVG element for a page. Its ids begin with ``prefix``; text is not drawn as outlines.
+    """Return a figure as an SVG element for a page; its ids begin with ``prefix``. Text is not drawn as outlines.
 
     The element has no style sheet of its own: that of the page contains what matplotlib would write.
     """
@@ -332,7 +332,7 @@ def render_svg_element(figure: figures.Figure, prefix: str) -> str:
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(
             content, metadata=nothing
-        )  # This function is used because `Figure.savefig` draws a figure twice.
+        )  # This function avoids `Figure.savefig`, which draws a figure twice.
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(

@@ -56,16 +56,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# Heights of a figure [inch]: with the energy only, and with the motion too. On a page, they apply to each panel.
+# Heights of a figure [inch], with the energy only and with the motion too. On a page, they apply to each panel.
 _HEIGHTS: Final = (4.0, 6.5)
 _PANELS: Final = (2.6, 2.0)
-# Largest number of candidates that are drawn as marks; more candidates are drawn as a band of admissible tr.
+# Largest number of candidates that are drawn as marks; otherwise, a band shows the admissible tr.
 _FEW: Final = 20
-# Height of the band at the bottom of the axes, as a fraction of the axes [-]; the curve lies above the band.
+# Height of the band at the bottom of the axes, below the curve, as a fraction of the axes [-].
 _BAND: Final = 0.045
 # Time shown before and after the flights of a plan, as a fraction of the time that they span [-].
 _BEYOND_FLIGHTS: Final = 0.05
-# Smallest length of a window whose label contains its times, as a fraction of the simulated time [-].
+# A window of at least this length has its times in its label, as a fraction of the simulated time [-].
 _ROOM_FOR_TIMES: Final = 0.2
 
 # Colours of the windows in a plan, keyed by verdict or state.
@@ -95,10 +95,10 @@ _MOST_PARTS: Final = 6
 # _TRADE_HEIGHT: height of the figure of ``explore`` in a file [inch].
 # _TRADE_PANEL: height of each axes in the figure of ``explore`` on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
-# Space before the first td and after the last td, as a fraction of the axes [-], so that marks there are complete.
+# Space before the first td and after the last td, as a fraction of the axes [-], to show the marks there in full.
 _AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
-# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of one colour.
+# Palette of Okabe and Ito without yellow, which is hard to see on white. Dashes distinguish lines of the same colour.
 _RUN_COLOURS: Final = (
     REFERENCE,
     SWITCHED,
@@ -109,30 +109,30 @@ _RUN_COLOURS: Final = (
     "#56b4e9",
 )
 _PATTERNS: Final = ("-", "--")
-# Largest number of runs that are all drawn in colour with a name; of more runs, only the outliers are.
+# Largest number of runs that are all drawn in colour and named; if there are more runs, only outliers are.
 _NAMED: Final = 10
 _MOST_OUTLIERS: Final = 5
 _GREY: Final = "#808080"
-# _DARK: number of lines that are together as dark as all grey curves may be.
+# _DARK: largest combined darkness of all grey curves, as an equivalent number of opaque lines.
 # _FAINTEST: smallest opacity of a grey curve [-].
 _DARK, _FAINTEST = 10, 0.02
-# Largest number of runs whose lines and marks are drawn thick.
+# If there are at most this many runs, their lines and marks are drawn thick.
 _MANY: Final = 40
 # _BEFORE: time shown before the first tr, as a fraction of the time from the first tr to td [-].
 # _AFTER: time shown after td, as a fraction of the time from the first tr to td [-].
 _BEFORE, _AFTER = 0.25, 0.15
 # Height of the figure of ``study`` in a file [inch].
 _HEIGHT: Final = 4.0
-# Height of the name of a run, as a fraction of the axes [-].
+# Height of a run name, as a fraction of the axes [-].
 _LINE: Final = 0.055
 # The line that connects a curve to its name ends at the left edge of the name.
 _ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
-# Largest ratio of the median level to the lowest level at which the axis still includes the lowest level [-].
+# The axis includes the lowest level if the median level is at most this many times the lowest level [-].
 _LOWEST: Final = 50.0
 
 
 def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
-    """Draw the energy in the flight with the target energy, the candidates or admissible windows, and the motion below.
+    """Draw the energy in the flight with the target energy and the candidates or admissible windows; below, the motion.
 
     On a page a better pair is drawn into the same figure, since a second figure would look nearly the same.
     """
@@ -147,7 +147,7 @@ def draw_suggestion(answer: PairSuggestion, *, page: bool = False) -> Figure:
 
 
 def draw_verdict(answer: PairVerdict, *, page: bool = False) -> Figure:
-    """Draw the energy in the flight with the target energy and the judged pair; below it, the motion after that pair.
+    """Draw the energy in the flight with the target energy and the judged pair; below, the motion after td.
 
     With a finished switched run, its energy is drawn over that of the reference instead of the motion of a model.
     """
@@ -192,7 +192,7 @@ def _draw(
     panels[-1].set_xlabel(add_unit("time", situation.history.time_unit))
     for panel in panels:
         figures.format_axes(panel, legend=not page)
-    # The level is an energy in the flight, even if td is after the end of the flight.
+    # The level is an energy in the flight, even if td lies after the end of the flight.
     scale = make_scale_of_flight(situation, view, [situation.energy_td])
     figures.show_span(panels[0], (view.start, view.end), scale, view.above)
     if page:
@@ -259,7 +259,7 @@ def _draw_energy(
 def _draw_better(
     panels: Sequence[Axes], better_situation: Situation, tr: float
 ) -> None:
-    """Draw a better pair for its own td: level, times and motion, in its own colour and line style."""
+    """Draw a better pair at another td: its level, times and motion, in a separate colour and line style."""
     lines = [panels[0].axhline(better_situation.energy_td)]
     lines += [
         panel.axvline(time) for panel in panels for time in (tr, better_situation.td)
@@ -324,14 +324,14 @@ def draw_plan(plan: RunPlan, *, page: bool = False) -> Figure:
 
 
 def _name_window_kind(row: PlannedFlight) -> str:
-    """Return the verdict on a window that this run supports, or else what must be done first."""
+    """Return the verdict on a window that this run supports; without a verdict, what must be done first."""
     if row.status == "supported" and row.decision:
         return row.decision.verdict
     return row.status
 
 
 def _show_flights(axes: Axes, plan: RunPlan) -> None:
-    """Limit the time axis to the flights, with a little space before and after them."""
+    """Limit the time axis to the flights, with some space before and after them."""
     if not plan.flights:
         return
     start = plan.flights[0].start
@@ -342,7 +342,7 @@ def _show_flights(axes: Axes, plan: RunPlan) -> None:
 
 
 def _label_window(number: int, window: Times, span: float) -> str:
-    """Return the number of a window, with its times if there is room for them."""
+    """Return the number of a window, and its times if there is room for them."""
     tr, td = window
     if td - tr < _ROOM_FOR_TIMES * span:
         return str(number)
@@ -373,7 +373,7 @@ def draw_run(
 
 
 def draw_parts(answer: Parts) -> Figure:
-    """Draw the flights and the largest energies of parts; raise FormatError if there are no parts."""
+    """Draw the flights and the largest part energies; raise FormatError if there are no parts."""
     run = answer.files
     energies = run.part_energies(run.parts)
     time = run.part_time
@@ -396,7 +396,7 @@ def _label_run_axes(history: History) -> tuple[str, str]:
 def _finish_run_axes(
     figure: Figure, axes: Axes, time_label: str, energy_label: str, *, page: bool
 ) -> None:
-    """Label the axes of a complete run, and put the legend below."""
+    """Label the axes of a figure of a complete run, and place the legend below them."""
     axes.set(xlabel=time_label, ylabel=energy_label)
     figures.format_axes(axes, legend=False)
     if page:
@@ -452,7 +452,7 @@ def draw_trade_off(trade_off: TradeOff, *, page: bool = False) -> Figure:
 
 
 def _draw_offers(axes: Axes, trade_off: TradeOff, values: list[float | None]) -> None:
-    """Draw one measure of all proposed pairs, with gaps for unknown values, and mark the Pareto-optimal pairs."""
+    """Draw one metric of all proposed pairs, with gaps for unknown values, and mark the Pareto-optimal pairs."""
     td = np.array([offer.td for offer in trade_off.offers])
     drawn = np.array([np.nan if value is None else value for value in values])
     best = np.array([offer.unbeaten for offer in trade_off.offers], dtype=bool)
@@ -471,7 +471,7 @@ class _Named(NamedTuple):
 
 def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
     """Draw the energies of all runs around td, the tr of each run, the common tr, and td."""
-    # matplotlib has to compute the margins, because their width depends on the names next to the axes.
+    # matplotlib has to compute the margins, because their width depends on the run names next to the axes.
     figure = Figure(
         figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT),
         layout="constrained",
@@ -510,7 +510,7 @@ def draw_study(answer: StudyOfRuns, *, page: bool = False) -> Figure:
 def _choose_named_runs(
     runs: Sequence[StudyRow], curves: Mapping[int, Samples]
 ) -> list[_Named]:
-    """Return the runs that get a colour and a name: all runs if there are few, otherwise the outliers."""
+    """Return the runs that are drawn in colour and named: all runs if there are few, otherwise the outliers."""
     if len(runs) <= _NAMED:
         chosen = list(runs)
     else:
@@ -568,7 +568,7 @@ def _show_runs(
     drawn: Sequence[StudyRow],
     curves: Sequence[Samples],
 ) -> None:
-    """Limit the axes to the time from shortly before the first tr to shortly after td, with all energies in it."""
+    """Limit the axes to the time from shortly before the first tr to shortly after td, and to the energies in it."""
     if not curves:
         return
     first = min(float(curve[0, 0]) for curve in curves)
@@ -608,7 +608,7 @@ def _select_energies(
 
 
 def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> None:
-    """Write the names of runs next to the axes, in the order of their curves, each joined to its curve by a line."""
+    """Write the run names next to the axes, in the order of the curves; a line connects each name to its curve."""
     end = axes.get_xlim()[1]
     free = 0.0
     runs_by_height = (
@@ -639,7 +639,7 @@ def _write_names(axes: Axes, named_runs: Sequence[_Named], *, page: bool) -> Non
 
 
 def _compute_height(axes: Axes, value: float) -> float:
-    """Return the height of a value in the axes [-], from 0 at the bottom to 1 at the top."""
+    """Return the height of a value on the axes [-], from 0 at the bottom to 1 at the top."""
     bottom, top = axes.get_ylim()
     value = min(max(value, bottom), top)
     if axes.get_yscale() == "log":

@@ -1,4 +1,4 @@
-"""Draw a vibration of several modes: the energy midway between tr and td, and the residual of each tr."""
+"""Draw a vibration with several modes: the energy midway between tr and td, and the residual of each tr."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
 
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
-    """Draw the residual of each tr in the flight, and the residual of having no vibration after td."""
+    """Draw the residual of each tr in the flight, and the residual of a release without any vibration."""
     profile = situation.vibration.profile
     start = situation.earliest_tr
     assert profile is not None

@@ -119,7 +119,7 @@ def as_table(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _name_next_step(checks: Checks) -> str:
-    """Return what to do after the check, with a command that can be typed."""
+    """Return what to do after the check, with a command that can be copied."""
     serious = [
         finding
         for result in checks.results
@@ -152,7 +152,7 @@ def _name_next_step(checks: Checks) -> str:
 
 
 def as_ndjson(checks: Checks, display: DisplayOptions) -> str:
-    """Return one line of JSON per deck; each line has the schema of a complete result."""
+    """Return one line of JSON per deck, each with the schema of a complete result."""
     deck_checks = (replace(checks, results=[result]) for result in checks.results)
     return "\n".join(
         DOCUMENT.as_json(deck_check, display.command, None)
@@ -182,7 +182,7 @@ def as_csv(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_markdown(checks: Checks, _: DisplayOptions) -> str:
-    """Return the verdicts as a list and the findings as a Markdown table, with their number."""
+    """Return the verdicts as a list, the findings as a Markdown table, and their number."""
     rows = [list(FINDING.plain(finding).values()) for finding in _list_findings(checks)]
     verdicts = [
         f"* {tables.escape_markdown(judged.sentence)}"
@@ -198,7 +198,7 @@ def as_markdown(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_github(checks: Checks, _: DisplayOptions) -> str:
-    """Return workflow commands that make GitHub Actions show verdicts and findings next to the lines of a deck."""
+    """Return workflow commands that make GitHub Actions show verdicts and findings next to the deck lines."""
     verdicts = [
         f"::notice file={_escape_for_github(judged.file, ',:')},line={judged.line},col={judged.column},"
         f"title={judged.verdict}::{_escape_for_github(judged.sentence)}"
@@ -226,7 +226,7 @@ def as_github(checks: Checks, _: DisplayOptions) -> str:
 
 
 def as_junit(checks: Checks, _: DisplayOptions) -> str:
-    """Return a suite per deck and a case per finding. Findings less severe than ``fail_on`` pass with a message.
+    """Return a JUnit suite per deck and a case per finding; findings less severe than ``fail_on`` pass with a message.
 
     The output of the suite is the verdicts.
     """
@@ -282,7 +282,7 @@ def as_junit(checks: Checks, _: DisplayOptions) -> str:
 
 
 def _make_sarif_help(rule: Rule) -> dict[str, str]:
-    """Return the fix of a rule, and the place in the documentation that explains the rule.
+    """Return the fix for the findings of a rule, and the place in the documentation that explains the rule.
 
     SARIF requires an absolute address as ``helpUri``.  The documentation has none, so the text names its page and
     anchor.
@@ -366,7 +366,7 @@ def _format_windows(windows: Sequence[CheckedWindow], root: str) -> Iterator[str
 
 
 def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindow]]:
-    """Yield the windows in groups with the same cards, times and verdict."""
+    """Yield the windows in groups that have the same cards, times and verdict."""
     alike = (
         (
             (window.cards, window.unit.kind, window.tr, window.td, window.decision),
@@ -378,7 +378,7 @@ def _group_alike(windows: Sequence[CheckedWindow]) -> Iterator[list[CheckedWindo
 
 
 def _describe_windows(group: Sequence[CheckedWindow]) -> str:
-    """Describe windows that are alike: the verdict if they were judged, the parts and the times."""
+    """Describe similar windows: their verdict if they were judged, their parts and their times."""
     first = group[0]
     until = "the end" if first.td is None else f"{first.td:g}"
     names = name_units((window.unit.id for window in group), first.unit.kind)
@@ -387,7 +387,7 @@ def _describe_windows(group: Sequence[CheckedWindow]) -> str:
 
 
 class _JudgedWindow(NamedTuple):
-    """The verdict in words on windows that are alike, and the location of the card that makes the parts rigid."""
+    """Verdict on similar windows as text, and the location of the card that makes the parts rigid."""
 
     verdict: str
     sentence: str
@@ -433,7 +433,7 @@ def _list_window_objects(checks: Checks) -> Iterator[dict[str, Any]]:
 
 
 def _list_decision_values(decision: Decision | None) -> dict[str, str | None]:
-    """Return the verdict on a pair, its reason and its cure, keyed by JSON key; None if the pair was not judged."""
+    """Return the verdict on a pair with its reason and cure, keyed like the JSON output; None if it was not judged."""
     return {
         "verdict": decision and decision.verdict,
         "verdict_reason": decision and decision.reason,
@@ -505,7 +505,7 @@ def _count_severities(results: Sequence[Checked]) -> dict[str, int]:
 
 
 def _summarize_findings(checks: Checks) -> str:
-    """Return the number of findings and decks, and the input that was not judged, as a sentence."""
+    """Return the numbers of findings and decks, and the input that was not judged, as a sentence."""
     results = checks.results
     counted = [
         f"{count} {noun}{'s' * (count != 1)}"
@@ -518,7 +518,7 @@ def _summarize_findings(checks: Checks) -> str:
 
 
 def _format_path(path: str, root: str) -> str:
-    """Return a path for display, with ``/`` and no undecodable bytes; it is relative to ``root`` if inside it."""
+    """Return a path for display, with ``/`` and no undecodable bytes; a path inside ``root`` becomes relative to it."""
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  pathlib would slow start-up
@@ -531,7 +531,7 @@ def _format_path(path: str, root: str) -> str:
 
 
 def _make_sarif_locations(displayed: str, **keywords: Any) -> list[dict[str, Any]]:
-    """Return a location in a file in the form that SARIF defines."""
+    """Return a location in a file in SARIF format."""
     from urllib.parse import quote
 
     uri = f"{'file://' * displayed.startswith('/')}{quote(displayed)}"
@@ -545,12 +545,12 @@ def _escape_for_github(text: str, separators: str = "") -> str:
 
 
 def _escape_for_xml(text: str) -> str:
-    """Replace the characters of a string that XML 1.0 cannot contain or that a terminal does not show."""
+    """Replace characters that XML 1.0 does not allow or that a terminal does not show."""
     return re.sub(_NOT_XML, "?", make_printable(text))
 
 
 def list_rules() -> str:
-    """Return id, severity and summary of every rule."""
+    """Return the id, severity and summary of every rule."""
     return "\n".join(
         f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values()
     )
@@ -611,7 +611,7 @@ def explain_rule(rule: Rule, width: int, *, with_examples: bool) -> str:
 
 
 def _format_example(title: str, example: Example, width: int) -> Iterator[str]:
-    """Return the lines of an example deck, of its included files, and of the files with which it is compared."""
+    """Return the lines of an example deck, of the files that it includes, and of the files to which it is compared."""
     if example.history:
         yield f"{title}, with the history of"
         yield tables.wrap_command(

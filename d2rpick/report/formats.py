@@ -1,4 +1,4 @@
-"""List the output forms of each result, and write results in these forms.
+"""List the output formats of each result, and write results in these formats.
 
 Each result has a module in this folder.  It is imported only to write the result, so that ``--help`` starts fast.
 """
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-# Largest width of text [columns], because longer lines are hard to read.
+# Largest width of a text line [columns], because longer lines are hard to read.
 WIDEST: Final = 100
 
 PLAIN: Final = ("table", "json", "csv", "markdown")
-# The output forms of each result; the first form is the default.
+# Output formats of each result; the first format is the default.
 FORMATS: Final[Mapping[str, Sequence[str]]] = {
     "suggestion": (*PLAIN, "ndjson", "value"),
     "plan": (*PLAIN, "ndjson", "value"),
@@ -35,14 +35,14 @@ FORMATS: Final[Mapping[str, Sequence[str]]] = {
 
 
 class WrittenDeck(NamedTuple):
-    """The folder of a deck that was written with the cards of a plan, and whether the deck ``passed`` its check."""
+    """The folder of the deck that contains the cards of a plan, and whether the deck ``passed`` its check."""
 
     folder: str
     passed: bool
 
 
 class RepeatedQuestion(NamedTuple):
-    """Words of the command line with which another command asks about the same run.
+    """Parts of the command line with which another command asks about the same run.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class RepeatedQuestion(NamedTuple):
 
 
 class DisplayOptions(NamedTuple):
-    """What to show in addition to the answer: the command, the number of rows, and lines that were already written.
+    """Content to show in addition to the answer: the command, the number of rows, and lines that were already written.
 
     With ``every``, all windows of a plan are shown, not only the supported ones; with ``verbose``, all details.  Tables
     and text are no wider than ``width`` columns.  ``written_deck`` is the deck that was written with the answer.
@@ -84,7 +84,7 @@ class DisplayOptions(NamedTuple):
 
 
 def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
-    """Write an answer in one of its forms: JSON with the ``DOCUMENT`` of its module, other forms with its ``as_FORM``.
+    """Write an answer in a format: JSON by the ``DOCUMENT`` of a report module, other formats by its ``as_FORM``.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def write(result: str, form: str, answer: Any, display: DisplayOptions) -> str:
 def write_by_module(
     report: Any, form: str, answer: Any, display: DisplayOptions
 ) -> str:
-    """Write an answer in a form that the module ``report`` provides."""
+    """Write an answer in a format that ``module`` provides."""
     if write_form := getattr(report, f"as_{form}", None):
         return str(write_form(answer, display))
     return str(

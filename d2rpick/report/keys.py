@@ -1,4 +1,4 @@
-"""Define the fields that several results share: for a candidate, the history, its health, and the situation at td.
+"""Define the fields that several results share, which describe a candidate, the history, its health, and the situation.
 
 Tests compare the schemas in ``d2rpick/schemas`` with these tables; ``python -m tests.generated_schemas`` writes them.
 """
@@ -102,11 +102,11 @@ _POSITION: Final = (
           "true if the position error may be larger: an internal motion that is slower than the flight, or that bends "
           "the body, looks like a rotation; null if unknown", later=True),
 )  # fmt: skip
-# Kind of deprecated keys of single parts; they are null for one version before removal, as users may read them.
+# Type of deprecated keys of single parts. They are null for one version before removal, because users may read them.
 _NO_VALUE: Final = Kind({"type": "null"})
 NO_PARTS: Final = Field("parts", get_kind("texts", maxItems=0),
                         "deprecated: always empty, since parts are not compared one by one", lambda _: ())  # fmt: skip
-# All values of a candidate. New measures are added at the end, so that the columns of CSV files keep their order.
+# All values of a candidate. New values are added at the end, so that CSV columns keep their order.
 CANDIDATE: Final = row(
     Field("rank", get_kind("integer", minimum=1)),
     Field("tr", "number"),
@@ -155,7 +155,7 @@ CANDIDATE: Final = row(
         later=True,
     ),
 )
-# _OF_TR: keys that explain how tr was chosen, but do not rate the pair.
+# _OF_TR: keys that explain how tr was chosen but do not rate the pair.
 # _FIRST: keys of the ratings that ``verify`` shows first, in this order.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",

@@ -1,4 +1,4 @@
-"""Name the command that follows an answer, with the options and the files of its question, so that it can be typed."""
+"""Name the command that follows an answer, with the options and the files of its question, ready to be copied."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.report.formats import RepeatedQuestion
 
-# Ids in a command if the user has to name the parts or the nodes, because no file contains them.
+# Placeholder ids in a command if the user has to name the parts or the nodes, because no file contains them.
 _SOME_PART: Final = "1"
 _SOME_NODE: Final = "1001"
 
@@ -24,7 +24,7 @@ _SOME_NODE: Final = "1001"
 def write_command(
     question: RepeatedQuestion, name: str, *words: str, new_parts: Sequence[str] = ()
 ) -> str:
-    """Return another command about the same run, with the given parts unless ``new_parts`` replace them."""
+    """Return another command about the same run, with the given parts or, if there are any, the ``new_parts``."""
     parts = ("--part", ",".join(new_parts)) if new_parts else question.parts
     files = make_positional(question.files)
     return quote_shell_line(
@@ -41,7 +41,7 @@ def name_step_to_card(
     *,
     flying: bool,
 ) -> str:
-    """Return the step that prints the card of windows, with ``command`` (``suggest`` or ``plan``) or with ``card``.
+    """Return the step that prints the card for windows by ``command`` (``suggest`` or ``plan``) or by ``card``.
 
     If the files show which parts are ``flying`` but no part or energy was chosen, the step is to choose the parts.
     """

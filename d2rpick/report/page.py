@@ -1,4 +1,4 @@
-"""Build HTML pages: elements, made by nested calls that escape all text, and sections that several pages share.
+"""Build HTML pages from elements, made by nested calls that escape all text, and from sections shared by pages.
 
 Shared sections are the cards of a pair, the input that was read, and how to repeat the answer.
 """
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import OpenedRun
     from d2rpick.report.keys import Read
 
-# Smallest number of sections of a page with a table of contents.
+# Smallest number of sections for which a page has a table of contents.
 _LONG: Final = 4
-# Largest number of columns of a table that fits on a narrow screen.
+# Largest number of table columns that fit on a narrow screen.
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
@@ -45,7 +45,7 @@ _TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
 _CONTROLS = dict.fromkeys(
     {*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd"
 )
-_MOST_FILES: Final = 20  # Largest number of files of a deck that are named on a page.
+_MOST_FILES: Final = 20  # Largest number of deck files that are named on a page.
 # Labels of the lines on a page that the reader fills in by hand.
 SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
@@ -68,7 +68,7 @@ class PageSection(Markup):
 
 
 def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
-    """Return an element. In attribute names, ``_`` stands for ``-``; a final underscore avoids a Python keyword.
+    """Return an element. In attribute names, ``_`` stands for ``-``; a final underscore avoids Python keywords.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def make_element(name: str, /, *children: str, **attributes: str) -> Markup:
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
-    """Join elements and strings into one element."""
+    """Join elements and strings into a single piece of markup."""
     return Markup(
         between.join(
             child if isinstance(child, Markup) else _replace_markup(child, quote=False)
@@ -126,7 +126,7 @@ def build_document(
         make_element("title", title),
         *(make_element("style", sheet) for sheet in sheets),
     )
-    # The lines to be signed are at the top, because below a long card they might be printed on a separate sheet.
+    # The lines to be signed are at the top, because they might be printed on a separate sheet below a long card.
     sign = make_element(
         "p", *(make_element("span", line) for line in signed), class_="sign"
     )
@@ -197,7 +197,7 @@ def build_contents(content: Iterable[str]) -> Markup:
 
 
 def build_drawing(caption: str, svg: str) -> Markup:
-    """Return an SVG element with its caption."""
+    """Return an SVG element as a figure with a caption."""
     drawn = make_element("div", Markup(svg), role="img", aria_label=caption)
     return make_element(
         "figure", drawn, make_element("figcaption", caption), class_="drawn"
@@ -225,7 +225,7 @@ def build_scrolling_table(
     rows: Iterable[Sequence[Cell]],
     marked: int | None = None,
 ) -> Markup:
-    """Return a table in a box that scrolls sideways if needed; its ``title`` identifies it for keyboard users."""
+    """Return a table in a box that scrolls sideways if needed; ``title`` names the box for keyboard users."""
     box = make_element(
         "div",
         build_grid(head, rows, marked),
@@ -244,7 +244,7 @@ def build_scrolling_table(
 def build_grid(
     head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None
 ) -> Markup:
-    """Return a table without a scrolling box, in which the row ``marked`` is highlighted.
+    """Return a table without a scrolling box; the row ``marked`` is highlighted.
 
     Columns of numbers are right-aligned.  Lines break only at blanks, never within a number.
     """
@@ -298,7 +298,7 @@ def _replace_markup(text: str, *, quote: bool = True) -> str:
 
 
 class Explorer(NamedTuple):
-    """The trade-offs of one or several flights, to be explored on a page.
+    """Trade-offs of one or several flights that can be explored on a page.
 
     ``command`` has the words of the command line for a td, those before and those after the value of td.
     """
@@ -327,7 +327,7 @@ class PageContext(NamedTuple):
 
 
 def build_front(cards: Sequence[Markup], *below: Markup) -> Markup:
-    """Return the first section: the cards of the chosen or judged pairs next to each other, with remarks below."""
+    """Return the first section: the cards of the chosen or judged pairs side by side, with remarks below."""
     return make_element("section", make_element("div", *cards, class_="choice"), *below)
 
 
@@ -344,7 +344,7 @@ def build_refusal(reason: str) -> Markup:
 
 
 def get_title(run: OpenedRun) -> str:
-    """Return the title of the run that the solver wrote, or else the name of the file."""
+    """Return the run title from the solver or, without a title, the file name."""
     return (
         next((database.title for database in run.databases if database.title), "")
         or run.name
@@ -358,7 +358,7 @@ def build_pair_card(
     history: History,
     class_: str,
 ) -> Markup:
-    """Return the card of (tr, td): the times in large type, a description of the pair, and the exact times."""
+    """Return the card of (tr, td): the times in large type, a description of the pair, and the full-precision times."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     large_times = (
         make_element("span", make_element("i", name), f"{format_short(time)}{unit}")
@@ -386,7 +386,7 @@ def build_verdict_card(
     history: History,
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
-    """Return the card of a verdict: ``title``, the verdict as a badge, the times in large type, and the reason."""
+    """Return the card with a verdict: ``title``, the verdict as a badge, the times in large type, and the reason."""
     _, *why = list_verdict_lines(decision, *times)
     return build_pair_card(
         join([title, build_badge(decision)]),
@@ -398,7 +398,7 @@ def build_verdict_card(
 
 
 def build_badge(decision: Decision) -> Markup:
-    """Return the verdict in a frame of its colour."""
+    """Return the verdict in a frame of the verdict's colour."""
     class_ = f"badge {CLASSES[decision.verdict]}"
     return make_element("span", decision.verdict, class_=class_)
 
@@ -411,7 +411,7 @@ def list_digests(files: Iterable[Read]) -> list[tuple[str, str]]:
 def list_deck_digests(
     deck: Iterable[Read], weights: Weights | None
 ) -> list[tuple[str, str]]:
-    """Return the digests of a deck's files, beginning with the main file, and of the weights; long lists are cut."""
+    """Return the digests of a deck's files, the main file first, and of the weights; long lists are cut."""
     files = list({file.name: file for file in deck}.values())
     hidden_count = len(files) - _MOST_FILES
     if hidden_count > 0:
@@ -428,7 +428,7 @@ def list_deck_digests(
 
 
 def list_digests_of_settings(settings: Settings) -> list[tuple[str, str]]:
-    """Return the digests of the deck that an answer uses; empty if there is no deck."""
+    """Return the digests of the deck on which an answer is based; empty if there is no deck."""
     used = settings.by_deck
     return list_deck_digests(used.files, used.weights) if used else []
 

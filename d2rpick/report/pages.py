@@ -1,4 +1,4 @@
-"""Write answers as HTML: pages that are read, printed and signed, and displays in notebooks."""
+"""Write answers as HTML: pages to be read, printed and signed, and displays in notebooks."""
 
 from __future__ import annotations
 
@@ -60,13 +60,14 @@ if TYPE_CHECKING:
     from d2rpick.running.drive import Driven
 
 
-# Largest number of rows of a table on a page. More cannot be compared by eye; CSV and JSON contain all rows.
+# Largest number of table rows on a page. More rows cannot be compared by eye; CSV and JSON contain all rows.
 _MOST_ROWS = 20
 
-# Largest number of rows of a table in a notebook.
+# Largest number of table rows in a notebook.
 _FEW_ROWS: Final = 12
-_WIDEST: Final = "max-width: 40em"  # Largest width of a picture in a notebook.
-# Functions that return the sentences of an answer, and the header and rows of its table, keyed by kind of answer.
+# Largest width of a picture in a notebook, as a CSS length.
+_WIDEST: Final = "max-width: 40em"
+# Functions that return the sentences, table header and table rows of an answer, keyed by type of answer.
 _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
@@ -107,7 +108,7 @@ _LOOKS: Final[
         study.build_run_table,
     ),
 }
-# Functions that return the numbered reasons for the verdicts in a table, keyed by kind of answer.
+# Functions that return the numbered reasons for the verdicts in a table, keyed by type of answer.
 _REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
     "suggestion": lambda answer: suggestion.list_candidate_reasons(
         answer, answer.candidates[:_FEW_ROWS]
@@ -119,7 +120,7 @@ _REASONS: Final[Mapping[str, Callable[[Any], list[tuple[str, str]]]]] = {
 
 
 def _write_run_page(record: page.PageContext, *sections: Markup) -> str:
-    """Write a page about one run, with its script if the trade-offs can be explored."""
+    """Write a page about one run, with its script if it has trade-offs to explore."""
     needed = (
         {"styles": read_styles(), "scripts": read_scripts()} if record.explorer else {}
     )
@@ -158,7 +159,7 @@ def _draw_suggestion(answer: PairSuggestion) -> Markup:
 def _build_starred_table(
     title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> Markup:
-    """Remove the column of stars from a table, and highlight the recommended row, which has the star."""
+    """Remove the column of stars from a table, and highlight the recommended row, which a star marks."""
     marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
     return build_scrolling_table(title, *remove_star_column(head, rows), marked)
 
@@ -344,7 +345,7 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
 
 
 def _build_requested(answer: TradeOff, requested: Offer) -> Markup:
-    """Return the card of the best pair at the requested td, with the next better td."""
+    """Return the card of the best pair at the requested td, with the nearest better td."""
     decision = answer.decide_on(requested)
     if requested.best is None or decision is None:
         return page.build_refusal(
@@ -468,7 +469,7 @@ def study_page(answer: StudyOfRuns, command: Sequence[str]) -> str:
 
 
 def _list_below_card(answer: StudyOfRuns) -> Sequence[tuple[str, str]]:
-    """Return the common results of the runs, except those on the card of the common tr."""
+    """Return the results common to all runs, except those on the card of the common tr."""
     outcome = study.list_outcome(answer)
     return outcome if answer.common.tr is None else outcome[1:]
 
@@ -662,7 +663,7 @@ def summarise_files(run: OpenedRun) -> str:
 
 
 def show_at_a_glance(kind: str, answer: Any, figure: Figure | None) -> str:
-    """Return an answer, or the overview of a run, as HTML for a notebook; columns of unknown values are left out."""
+    """Return an answer, or the overview of a run, as HTML for a notebook; columns without known values are omitted."""
     give_sentences, table = _LOOKS[kind]
     lines = [
         make_element("div", make_element("b", name), f" {text}")

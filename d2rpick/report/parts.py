@@ -1,4 +1,4 @@
-"""Write the result of ``parts`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``parts`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ _IN_FLIGHT: Final = row(
         "true if the standard deviation of the energy is at least 10 % of its mean",
     ),
 )
-# The fields on a part's behaviour in flight describe the longest flight.
+# The fields for a part's behaviour in flight describe the longest flight.
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers of elements by kind; null without a deck"),
@@ -279,7 +279,7 @@ def as_markdown(answer: Parts, display: DisplayOptions) -> str:
 
 
 def as_csv(answer: Parts, _: DisplayOptions) -> str:
-    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output, with ``;`` in lists."""
+    """Return CSV with a row per part and a column for each key of ``parts`` in the JSON output; lists use ``;``."""
     return write_csv(PART.keys, map(PART.plain, answer.rows), ";")
 
 
@@ -324,7 +324,7 @@ def list_heading(answer: Parts) -> list[tuple[str, str]]:
 def build_part_table(
     answer: Parts, names: Iterable[str] = ()
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return header and rows of a table of parts with some columns; parts of the recommended set have a star."""
+    """Return header and rows of a table of parts with the given columns; parts of the recommended set have a star."""
     best = set(answer.recommended.parts) if answer.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
     return tables.fill_table(
@@ -344,7 +344,7 @@ def build_set_table(
 
 
 def _format_position_error(part_set: PartSet) -> str:
-    """Return the position error of a set as text, with the assumption behind it."""
+    """Return the position error of a set as text, with the underlying assumption."""
     error = _format_lower_bound(part_set, part_set.position_error)
     return f"{error} if one body" if part_set.position_assumes else error
 
@@ -405,7 +405,7 @@ def list_verdict_on_set(answer: Parts) -> list[tuple[str, str]]:
 
 
 def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str, str]]:
-    """Return the next command: to the plan with the recommended set, or to all td if its pair cannot be used."""
+    """Return the next command: ``plan`` with the recommended set, or ``explore`` if the pair of the set is unusable."""
     best = answer.recommended
     if best is None:
         return [("next", _name_step_without_set(answer, question))]
@@ -429,7 +429,7 @@ def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
 
 
 def _explain_no_part(answer: Parts) -> str:
-    """Explain why no set was compared: for some parts it is unknown whether they can be switched, or none can be."""
+    """Explain why no set was compared: no part can be switched, or this is unknown for some parts."""
     unknown_rows = [row for row in answer.rows if row.verdict == "unknown"]
     if not unknown_rows:
         return "no part can be switched"

@@ -1,4 +1,4 @@
-"""Write the result of ``plan`` as a table, JSON, CSV, Markdown and bare values."""
+"""Write the result of ``plan`` as a table, JSON, CSV, Markdown or bare values."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion, WrittenDeck
 
 
-# Run in which the parts can be switched in a window, keyed by status of the window.
+# The run in which the parts can be switched in a window, keyed by status of the window.
 _RUN: Final = {
     "supported": "next run",
     "re-plan": "later run",
@@ -67,7 +67,7 @@ def _get_situation(row: PlannedFlight) -> Situation | None:
 
 
 def _make_margin_getter(key: str) -> Callable[[PlannedFlight], Any]:
-    """Return a function that reads a value of a window's margin, and returns None if the window is already done."""
+    """Return a function that reads a value of a window's margin; its result is None if the window is already used."""
     return lambda row: None if row.done else getattr(row.margin, key)
 
 
@@ -263,7 +263,7 @@ def give_plan_sentence(plan: RunPlan) -> str:
 
 
 def _describe_use(plan: RunPlan) -> str:
-    """Describe how many windows can be used now, which of them only with care, and which planned windows not at all."""
+    """Describe how many windows can be used now, how many only with care, and how many planned windows not at all."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
     if len(decisions) == 1:
         number, decision = decisions[0]
@@ -343,7 +343,7 @@ def _list_step_without_window(
 
 
 def list_verdicts(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return why the planned windows are not better and how to improve them, each with the name of its flight."""
+    """Return why the planned windows are no better and how to improve them, each with the name of its flight."""
     return [
         (f"flight {row.number}", format_in_full(row.decision))
         for row in plan.flights
@@ -381,7 +381,7 @@ def as_csv(plan: RunPlan, _: DisplayOptions) -> str:
 
 
 def as_value(plan: RunPlan, display: DisplayOptions) -> str:
-    """Return a line ``tr td`` for each window of the next run, with the fewest digits that give the same numbers.
+    """Return a line ``tr td`` for each window of the next run, with the fewest digits that round-trip exactly.
 
     The windows of the next run are those that are done and the supported new windows or, on request, all new windows.
     Nothing is returned if there is no new window.
@@ -391,7 +391,7 @@ def as_value(plan: RunPlan, display: DisplayOptions) -> str:
 
 
 def list_plan_remarks(plan: RunPlan) -> list[tuple[str, str]]:
-    """Return the rigid time given up for quality, and the position errors, as (name, sentence) pairs."""
+    """Return the rigid time sacrificed for quality, and the position errors, as (name, sentence) pairs."""
     supported = plan.supported
     lines = []
     pairs = [(row.number, row.answer) for row in supported if row.answer]
@@ -470,7 +470,7 @@ def _format_place_error(row: PlannedFlight) -> str | None:
 
 
 def _get_verdict(row: PlannedFlight) -> str | None:
-    """Return the verdict on the pair of a flight; None if it may be used but has no window, as in a short flight."""
+    """Return the verdict on the pair of a flight; None if the pair is usable but the flight has no window."""
     if row.decision is None:
         return None
     if row.window is None and row.decision.verdict == USE:

@@ -1,4 +1,4 @@
-"""Write the scan of ``rollover`` as a table, JSON, CSV and Markdown."""
+"""Write the results of a ``rollover`` scan as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ DOCUMENT: Final = Document(
 
 
 class Scan(NamedTuple):
-    """Runs switched at many tr, the ``reference`` run, and the recommendation from the reference run."""
+    """Runs switched at many tr, the ``reference`` run, and the recommendation derived from the reference run."""
 
     reference: Record
     outcomes: Sequence[Outcome]
@@ -80,7 +80,7 @@ class Scan(NamedTuple):
 
 
 def as_table(scan: Scan, display: DisplayOptions) -> str:
-    """Return as text the events of the reference run, a row for each tr, and the error of the recommended tr."""
+    """Return as text the events of the reference run, one row per tr, and the error of the recommended tr."""
     reference, outcomes, answer, _ = scan
     td = answer.situation.td
     recommended = _get_recommended_tr(answer)

@@ -1,4 +1,4 @@
-"""Describe the common content of suggest and verify: history, flight, oscillator and health of the run."""
+"""Describe what suggest and verify have in common: history, flight, oscillator and health of the run."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _describe_basis(situation: Situation) -> str:
 
 
 def _explain_level_alone(situation: Situation) -> str:
-    """Return a note that no deformation is known, with the reason if several modes vibrate."""
+    """Return a note that no deformation is known, with the reason if several modes are involved."""
     if situation.at_rest:
         return "energy: nothing vibrates"
     fit = situation.evidence.fit
@@ -143,7 +143,7 @@ def list_health_columns(health: Health) -> tuple[str, ...]:
 
 
 class Measure(NamedTuple):
-    """A displayed health measure; ``value`` and ``good`` are None if the files lack the energies for it."""
+    """A displayed health quantity; ``value`` and ``good`` are None if the files lack the energies needed for it."""
 
     what: str
     value: str | None
@@ -152,7 +152,7 @@ class Measure(NamedTuple):
 
 
 def list_health_measures(health: Health) -> list[Measure]:
-    """Return all health measures of a run; the measures of its rigid window come last."""
+    """Return all health quantities of a run; those for its rigid window come last."""
     low = health.energy_ratio_min
     high = health.energy_ratio_max
     span = None if low is None or high is None else (low, high)

@@ -127,7 +127,7 @@ _LINE: Final = row(
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 _MOST_REASONS: Final = 3
-# Columns omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
+# Columns that are omitted, in this order, if a terminal is too narrow; the energy at td is omitted before them.
 _SPARE: Final = ("+-", "basis", "error at common tr")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -139,7 +139,7 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return as text the common results of the runs, and one line per run with its shortened name."""
+    """Return as text the results common to all runs, and one line per run with its shortened name."""
     head, rows = tables.select_known_columns(*build_run_table(answer))
     rows = [
         [name, *row[1:]]
@@ -166,7 +166,7 @@ def as_table(answer: StudyOfRuns, display: DisplayOptions) -> str:
 
 
 def as_markdown(answer: StudyOfRuns, display: DisplayOptions) -> str:
-    """Return the common results of the runs, and the runs as a Markdown table."""
+    """Return the results common to all runs, and a Markdown table of the runs."""
     outcome_lines = tables.format_as_list(
         [
             *list_outcome(answer),
@@ -234,13 +234,13 @@ def build_run_table(answer: StudyOfRuns) -> tuple[list[str], list[list[tables.Ce
 
 
 def _explain_status(row: StudyRow) -> str:
-    """Return the message of a run without its name, or else the codes of its warnings; empty if it has neither."""
+    """Return the message of a run without the run's name; if there is none, the codes of its warnings, if any."""
     text = row.message or ", ".join(row.warnings)
     return text.removeprefix(f"{row.source.rstrip('/')}: ")
 
 
 def name_target_energy(answer: StudyOfRuns) -> str:
-    """Return the header of the column of target energies, with the unit if all runs name the same unit."""
+    """Return the header of the target-energy column, with the unit if all runs name the same unit."""
     return f"E(td) [{answer.energy_unit}]" if answer.energy_unit else "E(td)"
 
 
@@ -280,7 +280,7 @@ def _name_error(answer: StudyOfRuns) -> str:
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
-    """Return the smallest and largest error as text, or one number if both are displayed alike."""
+    """Return the smallest and largest error as text, or a single number if both are displayed alike."""
     low = tables.format_measure(min(errors))
     high = tables.format_measure(max(errors))
     return low if low == high else f"{low} to {high}"
@@ -319,7 +319,7 @@ def _count_verdicts(answer: StudyOfRuns) -> str:
 
 
 def list_run_reasons(answer: StudyOfRuns) -> list[tuple[str, str]]:
-    """Return why the runs' pairs are not better, and how to improve them; each reason occurs once."""
+    """Return why the pairs of the runs are no better and how to improve them; each reason occurs once."""
     causes = Counter(
         (row.verdict, row.verdict_reason, row.cure)
         for row in answer.runs
@@ -361,7 +361,7 @@ def list_next_step(
 
 
 def describe_td(answer: StudyOfRuns) -> str:
-    """Describe the td of all runs, or the range in which each run has its own td."""
+    """Describe the td common to all runs, or the range in which each run has its own td."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     if answer.td is None:

@@ -1,4 +1,4 @@
-"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown and a bare value."""
+"""Write the result of ``suggest`` as a table, JSON, CSV, Markdown or a bare value."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.decision import Decision
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
-# Largest number of windows of acceptable tr that are listed in a line of text.
+# Largest number of windows of acceptable tr that are listed on one line of text.
 _NAMED = 4
 _WINDOW: Final = row(
     *keys.WINDOW.fields,
     Field("recommended", "flag", "true if the range contains the recommended tr"),
 )
-# A pair with the decision on it.
+# Fields of a pair and of the decision on it.
 _JUDGED_PAIR: Final = row(
     *keys.PAIR.fields,
     Field("verdict", keys.VERDICT),
     Field("verdict_reason", "text"),
     later=("verdict", "verdict_reason"),
 )
-# A candidate and the decision on it.
+# Fields of a candidate and of the decision on it.
 CANDIDATE: Final = row(
     *keys.CANDIDATE.of_part(lambda candidate_and_decision: candidate_and_decision[0]),
     keys.NO_PARTS,
@@ -74,7 +74,7 @@ def _add_decisions(answer: PairSuggestion) -> list[tuple[Candidate, Decision]]:
 
 
 def _list_acceptable_windows(answer: PairSuggestion) -> list[dict[str, Any]] | None:
-    """Return the windows of acceptable tr, and which of them contains the recommended tr."""
+    """Return the windows of acceptable tr, each marked if it contains the recommended tr."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
     if windows is None:
@@ -119,7 +119,7 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 
 
 def as_table(answer: PairSuggestion, display: DisplayOptions) -> str:
-    """Return the verdict, its evidence, and the first candidates; the recommended row has a star.
+    """Return the verdict, its evidence, and the first candidates; a star marks the recommended row.
 
     If nothing is recommended, candidates are listed only if all details are asked for.
     """
@@ -187,7 +187,7 @@ def as_csv(answer: PairSuggestion, _: DisplayOptions) -> str:
 
 
 def list_verdict(answer: PairSuggestion) -> list[tuple[str, str]]:
-    """Return what to do with the recommended pair, why, and what to expect after td, each with its name."""
+    """Return (name, sentence) pairs: what to do with the recommended pair, why, and what to expect after td."""
     best = answer.chosen
     decision = answer.decision
     better = answer.clearly_better
@@ -228,7 +228,7 @@ def list_evidence(answer: PairSuggestion) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairSuggestion, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of a pair that can be used, otherwise to a better pair."""
+    """Return the next command, which leads to the card of a usable pair or, if there is none, to a better pair."""
     decision = answer.decision
     situation = answer.situation
     pair = answer.recommended
@@ -310,7 +310,7 @@ def list_alternatives(answer: PairSuggestion) -> list[tuple[str, str]]:
 
 
 def describe_position_error(best: Candidate, *, deck: bool) -> str:
-    """Describe the position error of a body at td, its cause, and its assumptions, which depend on a ``deck``."""
+    """Describe the position error of a body at td, its cause and its assumptions; ``deck``: a deck is used."""
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
     taken += " (`deck` shows which do)" if taken and not deck else ""
@@ -324,7 +324,7 @@ def describe_position_error(best: Candidate, *, deck: bool) -> str:
 
 
 def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
-    """Describe the rigid time given up for a better level or residual, and the improvement."""
+    """Describe the rigid time sacrificed for a better level or residual, and the improvement."""
     if longer.residual is None:
         better_quality = "a lower level at td"
     else:
@@ -342,7 +342,7 @@ def describe_given_up_time(longer: Pair, chosen: Pair) -> str:
 def describe_acceptable_windows(
     windows: Sequence[AcceptableWindow], tr: float | None
 ) -> str:
-    """Describe the windows of acceptable tr: that of the recommended tr, the longest others, and the sum of all."""
+    """Describe the windows of acceptable tr: the one with the recommended tr, the longest others, and the total."""
     share = sum(window.share for window in windows)
     if len(windows) == 1:
         return f"every tr from {format_window(*windows[0][:2])}, {share:.0%} of the flight up to td"
@@ -370,7 +370,7 @@ def has_recommended_tr(window: AcceptableWindow, tr: float | None) -> bool:
 
 
 def as_value(answer: PairSuggestion, _: DisplayOptions) -> str:
-    """Return the recommended tr, and td if it was chosen too, with just enough digits to give the same number.
+    """Return the recommended tr, and td if it was chosen too, with just enough digits to round-trip exactly.
 
     The text is empty if there is no recommendation.
     """
@@ -418,7 +418,7 @@ def list_candidate_reasons(
 def _number_candidate_reasons(
     answer: PairSuggestion, listed: Sequence[Candidate]
 ) -> dict[str, int]:
-    """Number the reasons that explain why the listed candidates are not rated higher."""
+    """Assign a number to each reason why a listed candidate is not rated higher."""
     return number_reasons(map(answer.decision_on, listed))
 
 

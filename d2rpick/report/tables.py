@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# _WORD: if a table is too wide, words with more characters than this, such as paths, are split first.
-# _LEAST: if the table is still too wide, words with more characters than this are split; numbers are shorter.
+# _WORD: in a table that is too wide, words with more characters than this, such as paths, are split first.
+# _LEAST: in a table that is still too wide, words with more characters than this are split; numbers are shorter.
 _WORD: Final = 32
 _LEAST: Final = 12
 # _NUMBER: pattern of a number, which is not treated as a spreadsheet formula.
@@ -24,7 +24,7 @@ _LEAST: Final = 12
 # A formula may follow a semicolon, because some spreadsheets use semicolons to separate the cells of a CSV file.
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
-# Largest number of characters of a cell that is not wrapped; longer cells are wrapped before columns are omitted.
+# Largest number of characters in a cell that is not wrapped; longer cells are wrapped before columns are omitted.
 _TEXT: Final = 20
 
 
@@ -60,14 +60,14 @@ def format_if_known(value: float | None, form: str) -> str | None:
 
 
 def format_half_width(low: float | None, high: float | None) -> str | None:
-    """Return half the width of an interval as text, for use after +-; None if the width is unknown."""
+    """Return half the width of an interval as text, to follow "+-"; None if the width is unknown."""
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
 def select_known_columns(
     head: Sequence[str], rows: Sequence[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Drop the columns without any known value.
+    """Drop the columns without known values.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def fill_table(
 def remove_star_column(
     head: Sequence[str], rows: Iterable[Sequence[Cell]]
 ) -> tuple[list[str], list[list[Cell]]]:
-    """Remove the first column, in which a star marks the recommendation, and write +- as ``±`` for a page."""
+    """Remove the first column, in which a star marks the recommendation, and replace +- with ``±`` for a page."""
     return [name.replace("+-", "±") for name in head[1:]], [
         list(row[1:]) for row in rows
     ]
@@ -117,7 +117,7 @@ def remove_star_column(
 def format_in_line(
     named_texts: Iterable[tuple[str, Cell]], width: int = 0
 ) -> list[str]:
-    """Return lines of a name and a text, aligned at ``width`` characters, by default the length of the longest name."""
+    """Return one line per name and text, aligned at ``width`` characters, by default the length of the longest name."""
     lines = list(named_texts)
     width = width or max((len(name) for name, _ in lines), default=0)
     return [f"{name.ljust(width)}  {format_short(value)}" for name, value in lines]
@@ -134,7 +134,7 @@ def as_text(
     width: int = WIDEST,
     spare: Iterable[str] = (),
 ) -> str:
-    """Return a table as text, with right-aligned numbers and two blanks between columns.
+    """Return a table as text, with right-aligned numbers and two spaces between columns.
 
     A table wider than ``width`` first loses the columns in ``spare``, in that order; then the widest columns
     wrap their text.
@@ -199,7 +199,7 @@ def wrap_lines(text: str, width: int) -> str:
 
 
 def wrap_command(line: str, width: int) -> str:
-    r"""Wrap a command line longer than ``width`` before its options, so that a shell still reads it as one line.
+    r"""Wrap a command line longer than ``width`` before its options; a shell still reads the result as one command.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def wrap_command(line: str, width: int) -> str:
 
 
 def _wrap_below_name(line: str, width: int) -> str:
-    """Wrap a line, and indent its continuation lines to the text after the name, or else like the line itself."""
+    """Wrap a line; indent its continuation lines to the text after the name or, without a name, like the line."""
     from textwrap import fill
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
@@ -317,7 +317,7 @@ def escape_markdown(text: str) -> str:
 
 
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    r"""Return CSV at full precision, with commas, line feeds at line ends, and empty cells for unknown values.
+    r"""Return CSV at full precision, with commas, line feeds as line endings, and empty cells for unknown values.
 
     A string that a spreadsheet would treat as a formula gets a leading apostrophe: names and titles come from files.
 
@@ -386,7 +386,7 @@ def quote_shell_line(words: Iterable[str]) -> str:
 
 
 def make_positional(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names as typed after the options of a command, with ``--`` before them if a name looks like an option.
+    """Return names as they are typed after the options of a command, with ``--`` first if a name looks like an option.
 
     Examples
     --------

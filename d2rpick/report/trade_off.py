@@ -1,4 +1,4 @@
-"""Write the result of ``explore`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``explore`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -50,15 +50,15 @@ OFFER: Final = row(
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
-# Columns of the CSV output and of a data frame.
+# Columns of the CSV output and of data frames.
 COLUMNS: Final = [
     key for key in OFFER.keys if key not in ("acceptable_windows", "expected")
 ]
 
 
-# Smallest change of the rigid time that is mentioned, relative to the rigid time [-].
+# Smallest relative change of the rigid time that is mentioned [-].
 _NO_CHANGE: Final = 5e-4
-# Error ratios between which an error is described as halved [-]; smaller ratios are given as numbers.
+# Range of error ratios that are described as halving the error [-]; other ratios are given as numbers.
 _HALF: Final = (0.45, 0.5)
 
 
@@ -77,7 +77,7 @@ _NOT_HALVED: Final = "No other td in the range halves this error without giving 
 
 
 def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
-    """Return the verdict with other choices, the Pareto-optimal pairs, the reasons for verdicts, and the input."""
+    """Return the verdict with alternatives, the Pareto-optimal pairs, the reasons for verdicts, and the input."""
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
@@ -111,7 +111,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return what to do with the requested or chosen pair, why, and what other td offer, as (name, text) pairs."""
+    """Return what to do with the requested or chosen pair, why, and what another td would change, with names."""
     if trade_off.requested is None:
         return [
             *_list_verdict_of_chosen(trade_off),
@@ -126,7 +126,7 @@ def list_answer_lines(trade_off: TradeOff) -> list[tuple[str, str]]:
 def list_next_step(
     trade_off: TradeOff, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of the requested or chosen pair if it can be used, or to a better pair."""
+    """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
     situation = trade_off.situation
@@ -153,7 +153,7 @@ def list_next_step(
 
 
 def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
-    """Return the verdict on the pair that ``suggest`` chooses in the range."""
+    """Return the verdict on the pair that ``suggest`` chooses in the td range."""
     best = trade_off.recommended
     decision = trade_off.decide_on(best) if best else None
     if best is None or best.best is None or decision is None:
@@ -165,7 +165,7 @@ def _list_verdict_of_chosen(trade_off: TradeOff) -> list[tuple[str, str]]:
 def _list_verdict_of_requested(
     trade_off: TradeOff, requested: Offer
 ) -> list[tuple[str, str]]:
-    """Return the verdict on the best pair at the requested td, and the next better td."""
+    """Return the verdict on the best pair at the requested td, and the nearest better td."""
     decision = trade_off.decide_on(requested)
     if requested.best is None or decision is None:
         lines = [
@@ -180,14 +180,14 @@ def _list_verdict_of_requested(
 
 
 def list_other_td(trade_off: TradeOff, requested: Offer) -> tuple[str, str]:
-    """Return what the next better td changes, as a (name, sentence) pair."""
+    """Return what the nearest better td changes, as a (name, sentence) pair."""
     return ("other td", _describe_step(trade_off, requested))
 
 
 def _list_choice_if_td_is_free(
     trade_off: TradeOff, requested: Offer
 ) -> list[tuple[str, str]]:
-    """Return the pair that ``suggest`` chooses in the range, unless this is the pair at the requested td."""
+    """Return the pair that ``suggest`` chooses in the td range, unless it is the pair at the requested td."""
     best = trade_off.recommended
     if best is None or best is requested or best.decision is None:
         return []
@@ -259,7 +259,7 @@ def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
 
 
 def as_csv(trade_off: TradeOff, _: DisplayOptions) -> str:
-    """Return CSV with a row for each td and a column for each key of ``offers`` in JSON that has a single value."""
+    """Return CSV with a row for each td and a column for each scalar key of ``offers`` in the JSON output."""
     return write_csv(COLUMNS, map(OFFER.plain, trade_off.offers))
 
 
@@ -277,7 +277,7 @@ def give_answer(trade_off: TradeOff) -> str:
 
 
 def _describe_step(trade_off: TradeOff, requested: Offer) -> str:
-    """Describe what the next better td changes, or state that no td is better."""
+    """Describe what the nearest better td changes, or state that no td is better."""
     step = trade_off.step
     if step is None:
         small = requested.error is not None and requested.error <= EQUALLY_GOOD
@@ -340,7 +340,7 @@ def _describe_error_change(start: Offer, step: Offer) -> str:
 
 
 def _describe_cost_change(start: Offer, step: Offer) -> str:
-    """Describe how the CPU time changes at the other td, or the rigid time if the cost of the parts is unknown."""
+    """Describe how the CPU time, or the rigid time if the cost of the parts is unknown, changes at the other td."""
     if start.saving is not None and step.saving is not None:
         longer = start.saving - step.saving
         if abs(longer) < _NO_CHANGE:
@@ -415,7 +415,7 @@ def list_offer_reasons(offers: Sequence[Offer]) -> list[tuple[str, str]]:
 
 
 def _number_offer_reasons(offers: Sequence[Offer]) -> dict[str, int]:
-    """Number the footnotes that explain why the proposed pairs are not rated higher."""
+    """Assign a number to each reason why a proposed pair is not rated higher."""
     return number_reasons(offer.decision for offer in offers if offer.decision)
 
 
@@ -426,7 +426,7 @@ def _format_verdict(offer: Offer, numbers: Mapping[str, int]) -> str:
 
 
 def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
-    """Return a function that formats a measure of the best pair at a td."""
+    """Return a function that formats a quantity of the best pair at a td."""
     return lambda offer: (
         tables.format_if_known(getattr(offer.best, key), form) if offer.best else None
     )

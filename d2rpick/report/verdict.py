@@ -1,4 +1,4 @@
-"""Write the result of ``verify`` as a table, JSON, CSV and Markdown."""
+"""Write the result of ``verify`` as a table, JSON, CSV or Markdown."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched.comparison import Comparison
     from d2rpick.report.formats import DisplayOptions, RepeatedQuestion
 
-# Fields of the judged pair, its measures and the verdict.
+# Fields of the judged pair, of its measured values, and of the verdict.
 MEASURES: Final = row(
     Field("tr", "number", get=lambda answer: answer.candidate.tr),
     Field("td", "number", get=lambda answer: answer.situation.td),
@@ -76,7 +76,7 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return as text the verdict with reasons and improvements, its evidence, and the measures of the pair."""
+    """Return as text the verdict with reasons and improvements, its evidence, and the measured values of the pair."""
     decided = answer.decision.reason
     remarks = [("note", reason) for reason in answer.reasons if reason not in decided]
     above = list_situation_heading(answer.situation, verbose=display.verbose)
@@ -110,7 +110,7 @@ def list_pair_verdict(answer: PairVerdict) -> list[tuple[str, str]]:
 def list_next_step(
     answer: PairVerdict, question: RepeatedQuestion
 ) -> list[tuple[str, str]]:
-    """Return the next command: to the card of a pair that can be used, a page on its switched run, or a better pair."""
+    """Return the next command: it leads to the card of a usable pair, a page on its switched run, or a better pair."""
     decision = answer.decision
     situation = answer.situation
     if decision.verdict == DO_NOT_USE:
@@ -141,7 +141,7 @@ def list_next_step(
 
 
 def list_comparison_verdict(switched: Comparison) -> tuple[str, str]:
-    """Return the name of a line, and whether the switched run agrees with the reference run, with the limits."""
+    """Return a name, and a text that states whether the switched run agrees with the reference run within limits."""
     compared = []
     if switched.mean_after_reference > 0:
         ratio = switched.mean_after / switched.mean_after_reference
@@ -170,7 +170,7 @@ def list_pair_evidence(answer: PairVerdict) -> list[tuple[str, str]]:
 
 
 def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
-    """Return the known measures of the pair with their displayed names."""
+    """Return the known values of the pair with their displayed names."""
     best = answer.candidate
     direction = {True: "the same", False: "opposite", None: None}[best.sign_match]
     unit = answer.situation.history.energy_unit
@@ -193,7 +193,7 @@ def list_known_measures(answer: PairVerdict) -> list[tuple[str, tables.Cell]]:
 
 
 def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
-    """Return the verdict, and the measures as a Markdown table of two columns."""
+    """Return the verdict, and the values of the pair as a Markdown table with two columns."""
     switched = answer.switched
     comparison_lines = [list_comparison_verdict(switched)] if switched else []
     paragraphs = tables.format_as_list(
@@ -217,7 +217,7 @@ def as_markdown(answer: PairVerdict, display: DisplayOptions) -> str:
 
 
 def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures, keyed by name, with the prefix ``switched_`` for a switched run. Reasons form one text."""
+    """Return the values of the pair, keyed by name; those of a switched run have the prefix ``switched_``."""
     situation = answer.situation
     measured: dict[str, Any] = {
         "energy_td": situation.energy_td,
@@ -235,13 +235,13 @@ def list_all_measures(answer: PairVerdict) -> dict[str, Any]:
 
 
 def as_csv(answer: PairVerdict, _: DisplayOptions) -> str:
-    """Return one row of CSV with a column for each key of `measures`."""
+    """Return one row of CSV with a column for each key that `measures` returns."""
     values = list_all_measures(answer)
     return tables.as_csv(list(values), [list(values.values())]).rstrip("\n")
 
 
 def compare_values(switched: Comparison) -> list[tuple[str, float, float]]:
-    """Return the numbers known for both runs as rows of name, reference run and switched run (header: `COMPARED`)."""
+    """Return the numbers known for both runs as rows of name, reference run and switched run (see `COMPARED`)."""
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
@@ -279,7 +279,7 @@ def _format_comparison(switched: Comparison) -> list[str]:
 
 
 def _list_switched_measures(answer: PairVerdict) -> dict[str, Any]:
-    """Return the measures of the switched run, keyed by name; empty if there is no switched run."""
+    """Return the values of the switched run, keyed by name; empty if there is no switched run."""
     values = SWITCHED.plain(answer.switched) if answer.switched else {}
     values = {
         name: "; ".join(value) if name == "objections" else value

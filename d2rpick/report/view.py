@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Time shown beyond each end of the flight, as a fraction of its length [-], so that load and landing are visible.
+# Time shown before and after the flight, as a fraction of its length [-], to make load and landing visible.
 _BEYOND = 0.06
-# LOGARITHMIC: largest ratio of the highest energy to the target energy on a linear energy axis [-].
+# LOGARITHMIC: the energy axis is logarithmic if the highest energy exceeds this multiple of the target energy [-].
 # BELOW_LEVEL: ratio of the target energy to the lowest energy of a logarithmic energy axis [-].
 LOGARITHMIC = 20.0
 BELOW_LEVEL = 100.0
-# Space above and below the curve, as a fraction of the height of the curve [-].
+# Space above and below a curve, as a fraction of the curve's height [-].
 _ROOM = 0.08
-# Fraction of a flight that is ignored at each of its ends, because the load or the landing may still act there [-].
+# Fraction of a flight that is ignored at each end, because the load or the landing may still act there [-].
 _UNSURE = 0.01
-# Number of points of a curve; it gives a few dozen points per oscillation cycle.
+# Number of points of a curve, which gives a few dozen points per oscillation cycle.
 _POINTS = 2000
 
 
@@ -46,7 +46,7 @@ class View(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """Lowest and highest visible value of an axis, with a margin [energy]; ``logarithmic`` gives the kind of axis."""
+    """Lowest and highest visible value of an axis [energy], and whether the axis is ``logarithmic``."""
 
     low: float
     high: float
@@ -56,7 +56,7 @@ class Scale(NamedTuple):
 def merge_windows(
     windows: Sequence[tuple[float, float]], gap: float
 ) -> list[tuple[float, float]]:
-    """Merge ascending windows that are less than ``gap`` apart [time], because noise produces hundreds of them.
+    """Merge ascending windows with gaps shorter than ``gap`` [time], because noise produces hundreds of windows.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def _read_flight_energies(
 
 
 class ReplayedMotion(NamedTuple):
-    """Deformation over ``time`` [time] in the reference run and in the ``switched`` run [square root of energy]."""
+    """Deformation at the times ``time`` in the reference run and in the ``switched`` run [square root of energy]."""
 
     time: Samples
     reference: Samples
@@ -211,7 +211,7 @@ def replay_motion(
 
 
 class Response(NamedTuple):
-    """Response of the single oscillator that describes a record; it determines the motion for any switch times.
+    """Response of the single oscillator that describes a record, from which the motion for any switch times follows.
 
     On an even grid of ``time`` (n,) [time], ``reference`` is the deformation without switching; ``release`` is the
     share of a released deformation that remains after the time since the first grid point.  Deformations vibrate about

@@ -1,4 +1,4 @@
-"""Explain what each warning means for the result, and its cure; ``d2rpick rule CODE`` prints the text.
+"""Explain what each warning means for the result and what to do; ``d2rpick rule CODE`` prints the text.
 
 The topics are the headings of docs/reference/warnings.md, which ``python -m tests.reference`` writes from these texts.
 """
@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 
 class Explanation(NamedTuple):
-    """The meaning of a warning for the result (``means``), and the cure (``fix``)."""
+    """The meaning of a warning for the result (``means``), and what to do (``fix``)."""
 
     means: str
     fix: str
@@ -413,6 +413,6 @@ EXPLANATIONS: Final = {
 
 
 def explain_warning(code: str) -> str:
-    """Return the explanation of the warning with a code, which is one of `EXPLANATIONS`."""
+    """Return the explanation of the warning with the given code, which is a key of `EXPLANATIONS`."""
     means, fix = EXPLANATIONS[code]
     return f"{code} (warning): {means}\n\nFix: {fix}"

@@ -1,4 +1,4 @@
-"""Rules of ``check``: the table of all rules, the configuration that selects them, and the check of one deck.
+"""Rules of ``check``: the table of all rules, the configuration that selects rules, and the check of one deck.
 
 They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml; the nearest file is used.
 """
@@ -42,17 +42,17 @@ _ALL = (
     for value in vars(module).values()
     if isinstance(value, Rule)
 )
-# Beginning of the ids of the rules that need an energy history.
+# Prefix of the ids of the rules that need an energy history.
 _BY_HISTORY: Final = "D2R2"
-# Smallest similarity (0 to 1) of a suggested rule id to the wrong id; this value permits one additional character.
+# Smallest similarity (0 to 1) between a wrong rule id and a suggested id; it permits one additional character.
 _ALIKE: Final = 0.9
-# Rules that report only consequences of a wrong unit, keyed by the rule that reports the wrong unit.
+# Rules that only report consequences of a wrong unit, keyed by the rule that reports the wrong unit.
 _FOLLOW: Final = {
     "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-# Other rules that already report the same field, such as a time after the end of the run, keyed by rule.
+# Other rules that report the same field, such as a time after the end of the run, keyed by rule.
 _FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
@@ -81,7 +81,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
 
 
 class Configuration(NamedTuple):
-    """The selected rules, as ids or prefixes of ids (``D2R1``), and the severities changed for single rules.
+    """The selected rules, as ids or id prefixes (``D2R1``), and the rules whose severity is changed.
 
     ``ignore`` overrides ``select``; an empty ``select`` selects all rules. ``source`` is the settings file. ``notes``
     name settings files that are not used because they belong to another user.
@@ -119,7 +119,7 @@ class Configuration(NamedTuple):
 
 
 def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
-    """Return the part of an error message that names the existing rule ids, and a similar rule id if there is one."""
+    """Return the part of an error message that lists the existing rule ids, with a similar id if there is one."""
     import difflib
 
     wanted = name.upper()
@@ -132,7 +132,7 @@ def _describe_expected(name: str, rule_ids: Collection[str]) -> str:
 
 
 def _count_differences(first: str, second: str) -> int:
-    """Return the number of different characters in two strings of equal length, or the longer of unequal lengths."""
+    """Return how many characters of two strings of equal length differ, or the longer of two unequal lengths."""
     if len(first) != len(second):
         return max(len(first), len(second))
     return sum(a != b for a, b in zip(first, second, strict=True))
@@ -141,7 +141,7 @@ def _count_differences(first: str, second: str) -> int:
 def read_configuration(
     table: Mapping[str, object], source: str = "", other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Return the configuration in a table of settings.
+    """Return the configuration defined in a table of settings.
 
     ``other_keys`` are keys that belong to other commands; so do nested tables, one for each command.
 
@@ -179,7 +179,7 @@ def read_configuration(
 def _read_rule_names(
     table: Mapping[str, object], key: str, source: str
 ) -> tuple[str, ...]:
-    """Return the rule ids that are listed under a key of the settings."""
+    """Return the rule ids listed under a key of the settings."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise ConfigurationError(
@@ -189,7 +189,7 @@ def _read_rule_names(
 
 
 class CheckedWindow(NamedTuple):
-    """A rigid window; ``place`` is the card that opens the window. The deck is not kept in memory.
+    """A rigid window; ``place`` is the card that opens it. The window does not keep the deck in memory.
 
     ``cards`` are the numbers of the cards that open and close it; the second one is None if no card closes it.
     ``decision`` is the verdict on its pair of times; None if no history judges the pair.
@@ -227,7 +227,7 @@ class Checked(NamedTuple):
 def find_configuration(
     deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Return the configuration nearest to a deck; the keys of ``override`` replace its own keys.
+    """Return the configuration closest to a deck; the keys of ``override`` replace the keys of this configuration.
 
     ``other_keys`` are keys that belong to other commands.
 
@@ -286,7 +286,7 @@ def check_deck(
     configuration.verify(RULES)
     case = _read_case(path, content, judge, restarts)
     findings = _remove_consequences(list(_apply_rules(case, configuration)))
-    order = {path: 0}  # The deck itself comes first, then its include files in order.
+    order = {path: 0}  # The deck comes first, followed by its include files in order.
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(
@@ -311,7 +311,7 @@ def check_deck(
 
 
 def _remove_consequences(findings: list[Finding]) -> list[Finding]:
-    """Remove findings that only follow from a wrong unit or time which another rule reports."""
+    """Remove findings that merely follow from a wrong unit or time reported by another rule."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
     reported_fields = {
@@ -329,7 +329,7 @@ def _remove_consequences(findings: list[Finding]) -> list[Finding]:
 
 
 def _strip_windows(case: Case) -> Iterator[CheckedWindow]:
-    """Yield the windows with their verdicts, in a form that does not keep the deck in memory."""
+    """Yield the windows with their verdicts in a form that does not keep the deck in memory."""
     numbers: dict[SwitchSet, int] = {}
     windows = case.windows.windows
     unjudged = [None] * len(windows)
@@ -352,7 +352,7 @@ def _strip_windows(case: Case) -> Iterator[CheckedWindow]:
 def _select_rules(
     solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
 ) -> tuple[Rule, ...]:
-    """Return the selected rules for a solver. The result is cached, because there may be thousands of decks."""
+    """Return the selected rules for a solver. The result is cached, because a check may cover thousands of decks."""
     configuration = Configuration(select, ignore)
     wanted = (
         rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)
@@ -387,7 +387,7 @@ def _apply_rules(case: Case, configuration: Configuration) -> Iterator[Finding]:
 def _read_case(
     path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]
 ) -> Case:
-    """Read a deck according to its content: a Radioss run, or an LS-DYNA deck with its restarts."""
+    """Read a deck according to its content, as a Radioss run or as an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and is_radioss(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe can be read only once
@@ -406,7 +406,7 @@ def _read_case(
 
 
 def _list_remarks(deck: Deck) -> Iterator[str]:
-    """Yield remarks on comments that try to silence a rule that does not exist."""
+    """Yield remarks on comments that try to silence nonexistent rules."""
     for card in deck.silencing:
         for name in card.block.silenced:
             if not (

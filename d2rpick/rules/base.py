@@ -1,4 +1,4 @@
-"""Define the input of a rule (the case: a deck, or a Radioss run) and its output (findings)."""
+"""Define the input of a rule (a case, i.e. a deck or a Radioss run) and its output (findings)."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
 
-# Values of CODE for which a switch set waits for a contact or wall force.
+# Values of CODE with which a switch set waits for a contact or wall force.
 _BY_FORCE = {1, 2, 3, 4}
 
 K = TypeVar("K")
@@ -56,7 +56,7 @@ V = TypeVar("V")
 
 
 def group_values(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Collect the values of each key, in the order in which the keys first occur."""
+    """Collect the values of each key, with the keys in the order of their first occurrence."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)
@@ -64,7 +64,7 @@ def group_values(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 
 class Severity(StrEnum):
-    """Severity of a finding; with an ``error`` the check fails."""
+    """Severity of a finding; a finding with the severity ``error`` makes the check fail."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -92,7 +92,7 @@ class Finding(NamedTuple):
 
 
 class Unreadable(NamedTuple):
-    """A deck that could not be checked, with the error; ``files`` are the known files of the deck."""
+    """A deck that could not be checked, with the error; ``files`` are those files of the deck that are known."""
 
     deck: str
     error: Exception
@@ -100,12 +100,12 @@ class Unreadable(NamedTuple):
 
     @property
     def code(self) -> str:
-        """Return the code of the warning that reports this deck."""
+        """Return the code of the warning that reports that this deck was not checked."""
         return "unreadable-deck" if isinstance(self.error, FORESEEN) else INTERNAL_ERROR
 
     @property
     def reason(self) -> str:
-        """Return one line that names the deck and the error."""
+        """Return one line that names the deck and states the error."""
         if self.code == INTERNAL_ERROR:
             return f"{self.deck}: {format_in_one_line(self.error)}"
         return format_in_one_line(self.error)
@@ -113,7 +113,7 @@ class Unreadable(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class Case:
-    """A deck as input of the rules; ``judge`` is given if an energy history is available to judge the windows."""
+    """A deck as the input of rules; ``judge`` is given if an energy history is available for judging the windows."""
 
     deck: Deck
     judge: HistoryJudge | None = None
@@ -147,7 +147,7 @@ class Case:
 
     @cached_property
     def windows(self) -> Windows:
-        """Return the rigid windows of all parts, including switches by a force if the history shows the force."""
+        """Return the rigid windows of all parts, including switches by a force if the history contains this force."""
         timed = find_windows(self.sets, self.parts)
         if self.sensed:
             by_sensor: list[tuple[float, SwitchEvent]] = []
@@ -162,7 +162,7 @@ class Case:
 
     @cached_property
     def judgements(self) -> tuple[tuple[SwitchWindow, Judgement], ...]:
-        """Return the windows with their judgements by the history; empty if there is no history."""
+        """Return the windows with their verdicts from the history; empty if there is no history."""
         if self.judge is None:
             return ()
         windows = self.windows.windows
@@ -188,7 +188,7 @@ class Case:
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
-        """Return the switches by a force, with their switching times in the history; empty if there is no history."""
+        """Return the force-controlled switches with their times in the history; empty if there is no history."""
         if self.judge is None or not any(
             header.code.value in _BY_FORCE for _, header in self.headers
         ):
@@ -205,7 +205,7 @@ class Case:
 
     @cached_property
     def by_condition(self) -> tuple[Forced, ...]:
-        """Return the switches by a force and by a sensor, with their windows."""
+        """Return the switches controlled by a force or a sensor, with their windows."""
         if not self.sensed:
             return self.forced
         # Imported here to keep start-up fast.
@@ -244,7 +244,7 @@ class Case:
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
-        """Return the switches that make a known part rigid."""
+        """Return the switches to rigid whose parts are known."""
         return tuple(
             event
             for event in self.windows.events
@@ -253,7 +253,7 @@ class Case:
 
     @property
     def whole(self) -> bool:
-        """Return True if all parts are known; a file that contains only switching cards belongs to another deck."""
+        """Return True if all parts are known, unlike in a file of switching cards that another deck includes."""
         return self.parts.all_known and bool(self.parts.materials)
 
     @cached_property
@@ -270,7 +270,7 @@ class Case:
 
     @cached_property
     def end(self) -> float | None:
-        """Return the end of the run [time of the deck]; None if it is unknown or not positive."""
+        """Return the end of the run [time of the deck]; None if it is missing or not positive."""
         if (
             self.end_time is None
             or self.end_time.problem
@@ -279,22 +279,22 @@ class Case:
             return None
         factors = [
             card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
-        ]  # The list is empty for Radioss, because only LS-DYNA decks scale ENDTIM.
+        ]  # The list is empty for Radioss, because only LS-DYNA decks can scale ENDTIM.
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
     def unread(self) -> Sequence[Unread]:
-        """Return the includes that were not read and may contain switching cards."""
+        """Return the include files that were not read and may contain switching cards."""
         return self.deck.unread
 
     @property
     def untimed(self) -> tuple[tuple[CardField, str], ...]:
-        """Return the cards that do not switch by time, each with the event that triggers the switch."""
+        """Return the cards that do not switch by time, each with the event that triggers it."""
         return ()
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Return the formulation of each solid part whose stresses do not rotate with a rigid body, by part id."""
+        """Return the formulation of solid parts whose stresses do not rotate with a rigid body, keyed by part id."""
         sections = read_sections(self.deck)
         part_sections = (
             (part, sections.get(number)) for part, number in self.parts.sections.items()
@@ -307,7 +307,7 @@ class Case:
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Return the parts that must not be switched, with the reason, keyed by part id."""
+        """Return the parts that must not be switched, with the reasons, keyed by part id."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
@@ -320,13 +320,13 @@ class Case:
         cards = [
             card for name in names for card in self.deck.named(name)[-1:] if card.rows
         ]
-        # ENDTIM and DT are in the same columns of their cards.
+        # ENDTIM and DT occupy the same columns on their cards.
         return tuple((card, card.real(card.rows[0], DATABASE["DT"])) for card in cards)
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
 class RunCase(Case):
-    """A Radioss run as input of the rules: starter deck, engine files (``legs``), and the resulting windows."""
+    """A Radioss run as the input of rules: its starter deck, its engine files (``legs``), and the resulting windows."""
 
     run: RadiossRun
 
@@ -405,12 +405,12 @@ class RunCase(Case):
 
     @cached_property
     def end_time(self) -> Value[float] | None:
-        """Return the end time of the last engine run as written in its file."""
+        """Return the end time of the last engine run, as written in its file."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
     def switching(self) -> int:
-        """Return the number of switching cards in engine runs, of bodies with a sensor, and of rigid parts."""
+        """Return the total number of switching cards in engine runs, bodies with a sensor, and rigid parts."""
         bodies = self.run.starter.bodies if self.run.starter else ()
         return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
@@ -448,7 +448,7 @@ class RunCase(Case):
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
-        """Return the parts that must not be switched, with the reason, keyed by part id."""
+        """Return the parts that must not be switched, with the reasons, keyed by part id."""
         # Imported here to keep start-up fast.
         from d2rpick.deck.unswitchable import find_unswitchable_in_radioss
 
@@ -468,7 +468,7 @@ class RunCase(Case):
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[SwitchWindow]]]:
-        """Return the indices of the engine runs in which a part or body is rigid, each with the rigid windows."""
+        """Return the indices of the engine runs in which a part or body is rigid, each with its rigid windows."""
         rigid_legs, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value

@@ -1,4 +1,4 @@
-"""Evaluate switches by a contact or rigid-wall force over a history that shows when a contact force acts.
+"""Evaluate switches controlled by a contact or rigid-wall force, with a history that shows when this force acts.
 
 Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
 contact exerts it: with momenta alone a deck with several contacts and walls is not judged.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # Start and end of each time span [time].
 
-# For each CODE: what exerts the force, and True if the set waits for the force, False if it waits for its end.
+# For each CODE: what exerts the force, and True if the set waits for the force to begin, False if to end.
 _CODES: Final = {
     1: ("rigid wall", False),
     2: ("contact", False),
@@ -34,14 +34,14 @@ _KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
     "contact": "CONTACT",
     "rigid wall": "RIGIDWALL",
 }
-# Smallest TIME2 that stands for the absence of a latest switching time.
+# If TIME2 is at least this, there is no latest switching time.
 _NEVER: Final = 1e20
-# Largest length of a window that is chatter and not a flight, as a fraction of the longest window [-].
+# Longest window that is treated as chatter instead of a flight, as a fraction of the longest window [-].
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch, or a pair of switches, by a force: its windows in the history, and the spans of the force [time].
+    """A force-controlled switch, or a pair of switches: its windows in the history, and the spans of the force [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
     time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
@@ -69,14 +69,14 @@ class Forced(NamedTuple):
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Return the windows that are not chatter; the end of a window that has none is infinity."""
+        """Return the windows that are not chatter; a window without an end gets the end infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
 
 
 class _Seen(NamedTuple):
-    """The time spans of the contact force that switches a set [time], and the data from which they were found."""
+    """The time spans of the contact force that switches a set [time], and the data that show them."""
 
     contacts: Spans
     source: str
@@ -138,7 +138,7 @@ def follow_forced_switches(
 def _see_contacts(
     deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
 ) -> _Seen | None:
-    """Return the contact spans for a set, from written forces, or from part momenta if the deck has only one contact.
+    """Return the contact spans for a set: from written forces, or from part momenta if the deck has only one contact.
 
     For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
     the contacts, and for a contact whose force triggers no switch (D2R008).
@@ -167,7 +167,7 @@ def _see_contacts(
 
 
 def _can_trigger(deck: Deck, header: SwitchHeader) -> bool:
-    """Return True if the force of the contact or rigid wall ENTNO may switch parts, or if the deck lacks it."""
+    """Return True if the force of the contact or rigid wall ENTNO may switch parts, or if the deck lacks ENTNO."""
     kind, _ = _CODES[header.code.value]
     entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
     return entity is None or kind != "contact" or entity.triggers
@@ -176,7 +176,7 @@ def _can_trigger(deck: Deck, header: SwitchHeader) -> bool:
 def find_spans_of_force(
     deck: Deck, judge: HistoryJudge, kind: str, number: int, least: float = 0.0
 ) -> Spans | None:
-    """Return the time spans [time] in which the written force of a contact or rigid wall exceeds ``least`` [force].
+    """Return the time spans in which the written force of a contact or rigid wall exceeds ``least`` [force] [time].
 
     Files name a contact by its id, or by its order if it has none.  Some name rigid walls by their order in any case:
     if there are several and their ids differ from their order, none is used.
@@ -184,7 +184,7 @@ def find_spans_of_force(
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)
     if entity is None:
-        # A file that contains only switching cards defines no contacts.
+        # A file of switching cards defines no contacts.
         alone = not entities.found and number > 0
         return judge.find_force_spans(kind, number, least) if alone else None
     name = entity.id or entity.number
@@ -199,7 +199,7 @@ def find_spans_of_force(
 
 
 def _has_one_force(deck: Deck) -> bool:
-    """Return True if a deck has at most one contact or rigid wall. A deck with only switching cards has none."""
+    """Return True if a deck has at most one contact or rigid wall; a file of switching cards has none."""
     return (
         len(read_entities(deck, "CONTACT").found)
         + len(read_entities(deck, "RIGIDWALL").found)
@@ -240,7 +240,7 @@ def _find_pair(
     by_card: dict[SwitchSet, list[SwitchEvent]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Return the set that makes the parts of ``rigid_card`` deformable again; None if there is none."""
+    """Return the set that makes the parts of ``rigid_card`` deformable again; None if there is no such set."""
     units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:

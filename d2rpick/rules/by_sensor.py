@@ -1,4 +1,4 @@
-"""Find when the *SENSOR_CONTROL of a switch set with CODE 5 switches, using the time and forces in a history."""
+"""Find when the *SENSOR_CONTROL of a CODE 5 switch set switches, from the times and forces in a history."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Sensed(NamedTuple):
-    """A switch set with CODE 5, and the ``changes`` of its sensor control, or the reason why they are ``unknown``."""
+    """A CODE 5 switch set with the ``changes`` of its sensor control, or the reason why they are ``unknown``."""
 
     by: SwitchSet
     changes: tuple[Change, ...] = ()
@@ -28,9 +28,9 @@ class Sensed(NamedTuple):
     def events(
         self, events: Sequence[SwitchEvent]
     ) -> Iterator[tuple[float, SwitchEvent]]:
-        """Yield the time and event of each switch; the parts are rigid while the control is on."""
+        """Yield the time and the event of each switch; the parts are rigid while the control is on."""
         set_events = [event for event in events if event.by is self.by]
-        # If a control begins as OFF, the parts are already deformable, so its first OFF switches nothing.
+        # If a control begins as OFF, the parts are deformable from the start, so its first OFF switches nothing.
         begins_off = self.changes[:1] == (Change(0.0, on=False),)
         for change in self.changes[begins_off:]:
             for event in set_events:

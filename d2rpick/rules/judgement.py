@@ -1,4 +1,4 @@
-"""Judge the windows of a deck by the energy history of a reference run, with the code of ``verify``.
+"""Judge the windows of a deck by the energy history of a reference run, with the same code as ``verify``.
 
 The rules do not import this module, because a check that has no history needs no numerics and so starts faster.
 """
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import OpenedRun, Selection
 
-# Codes of the warnings of ``verify`` that the check repeats, because no rule reports these problems.
+# Codes of those warnings of ``verify`` that the check repeats because no rule reports the problem.
 _KEPT: Final = (
     "truncated-input",
     "no-free-flight",
@@ -60,7 +60,7 @@ _UNKNOWN: Final = "the history does not show when the load ends; give that time 
 
 
 class Fault(NamedTuple):
-    """An objection to a window, based on an energy history: the rule, the time concerned (td or tr) and the message."""
+    """An objection to a window, based on an energy history: the rule, the time to change (td or tr), the message."""
 
     rule: str
     at_td: bool
@@ -68,7 +68,7 @@ class Fault(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """The objections to a window, and the verdict on its pair; None if the history is insufficient for a verdict."""
+    """The objections to a window, and the verdict on its pair (None if the history does not suffice for one)."""
 
     faults: tuple[Fault, ...] = ()
     decision: Decision | None = None
@@ -76,7 +76,7 @@ class Judgement(NamedTuple):
 
 @dataclass
 class HistoryJudge:
-    """Judges windows by the energy in a reference run: of the switched parts, or of the model if part data are missing.
+    """Judges windows by the energy of the switched parts in a reference run, or of the model if part data are missing.
 
     The parts that are switched together are judged together, as ``suggest`` chooses one pair of times for them.
 
@@ -108,12 +108,12 @@ class HistoryJudge:
 
     @property
     def end(self) -> float:
-        """Return the last time of the history."""
+        """Return the time of the last state of the history."""
         return self._reference(self._known[:1]).history.end
 
     @property
     def cautions(self) -> list[Caution]:
-        """Return the warnings of all judgements made so far."""
+        """Return the warnings that all judgements so far have issued."""
         return [
             caution._replace(message=f"{name_units(parts)}: {caution.message}")
             if parts
@@ -123,7 +123,7 @@ class HistoryJudge:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return what readers omitted or assumed in all judgements made so far."""
+        """Return what the readers omitted or assumed for all judgements so far."""
         return tuple(
             dict.fromkeys(
                 note
@@ -133,7 +133,7 @@ class HistoryJudge:
         )
 
     def _reference(self, parts: tuple[int, ...]) -> Reference:
-        """Return the reference run with the energy of given parts, or of the model if no parts are given."""
+        """Return the reference run with the energy of the given parts, or of the model if no parts are given."""
         if parts not in self._references:
             if parts:
                 chosen = self.selection._replace(parts=tuple(map(str, parts)))
@@ -145,7 +145,7 @@ class HistoryJudge:
     def judge(
         self, window: SwitchWindow, together: Iterable[int], *, by_force: bool = False
     ) -> Judgement:
-        """Judge a window. If td is missing or not after tr, only tr is judged.
+        """Judge a window. If td is missing or not later than tr, only tr is judged.
 
         ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
         judged between states of the history.
@@ -176,7 +176,7 @@ class HistoryJudge:
         return self._judgements[key]
 
     def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
-        """Return those parts that have internal energy at any time; None if the history lacks one of the parts."""
+        """Return the parts that have internal energy at any time; None if the history lacks one of the given parts."""
         chosen = [part for part in self.run.parts if part.id in parts]
         if len(chosen) < len(parts):
             return None
@@ -192,7 +192,7 @@ class HistoryJudge:
     def contacts(
         self, parts: Collection[int]
     ) -> tuple[tuple[float, float], ...] | None:
-        """Return the spans of contact forces on given parts [time], from their momenta; None if unknown."""
+        """Find the spans [time] in which contact forces act on the given parts from their momenta; None if unknown."""
         contact_times = self.pushed(parts)
         return contact_times and contact_times.spans
 
@@ -215,7 +215,7 @@ class HistoryJudge:
     def find_force_spans(
         self, kind: str, number: int, least: float = 0.0
     ) -> tuple[tuple[float, float], ...] | None:
-        """Return the spans in which a contact, interface or wall force acts [time]; None if no file has the force.
+        """Return the spans in which the force of a contact, interface or wall acts [time]; None if no file has it.
 
         ``least``: only a force above it counts [force].
         """
@@ -232,7 +232,7 @@ class HistoryJudge:
     def _judge_times(
         self, parts: tuple[int, ...], tr: float, td: float | None
     ) -> Judgement:
-        """Judge the times of parts that are switched together."""
+        """Judge the times of parts that are switched at the same times."""
         reference = self._reference(parts)
         history = reference.history
         outside = tuple(_find_times_outside(history, tr, td))
@@ -244,7 +244,7 @@ class HistoryJudge:
             return Judgement()
         verdict = verify_run(reference, tr, td, self.settings)
         if parts and not history.energy.any():
-            # Parts without energy lock in no energy, which a note reports; only the flight limits their times.
+            # Parts without energy lock in no energy (a note says so), so only the flight limits their times.
             is_flight_known = verdict.situation.flight.start is not None
             return Judgement(tuple(_judge_flight(verdict)) if is_flight_known else ())
         for caution in verdict.cautions:
@@ -256,7 +256,7 @@ class HistoryJudge:
 def _find_times_outside(
     history: History, tr: float, td: float | None
 ) -> Iterator[Fault]:
-    """Yield objections to times outside the history, and to a td that seems to be in another unit."""
+    """Yield objections to times outside the history, and to a td that seems to be in a different unit."""
     first = history.start
     last = history.end
     named_times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
@@ -283,7 +283,7 @@ def _find_times_outside(
 
 
 def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
-    """Yield the problems that follow from a verdict; an inadmissible pair has at least one error."""
+    """Yield the problems that follow from a verdict; an inadmissible pair leads to at least one error."""
     situation, decision = verdict.situation, verdict.decision
     limit_faults = [*_judge_limits(verdict)]
     faults = [*_judge_flight(verdict), *_judge_error(verdict), *limit_faults]
@@ -295,7 +295,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
         yield Fault("D2R209", False, what)
     elif (
         _loses_most(situation)
-        # A single mistake should cause only one finding.
+        # One mistake should cause only one finding.
         and not any(fault.at_td for fault in limit_faults)
     ):
         better = find_better_pair(situation)
@@ -307,7 +307,7 @@ def find_faults(verdict: PairVerdict) -> Iterator[Fault]:
 def _judge_open_window(
     history: History, tr: float, settings: Settings
 ) -> Iterator[Fault]:
-    """Object to a tr without td, unless it lies in the last flight of the history or in a flight around tr."""
+    """Object to a tr without td unless tr lies in the last flight of the history or in a flight around this tr."""
     last = examine_td(history, history.end, settings)
     earliest = last.earliest_tr
     if earliest is not None and tr >= earliest:
@@ -347,12 +347,12 @@ def _judge_flight(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _judge_error(verdict: PairVerdict) -> Iterator[Fault]:
-    """Yield an objection to the locked-in deformation: a wrong sign, or an error above the tolerance."""
+    """Yield an objection to the frozen deformation if it has the wrong sign or an error above the tolerance."""
     candidate = verdict.candidate
     situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
-        # If nothing vibrates, the energy at any tr equals the energy at td, apart from rounding.
+        # If nothing vibrates, the energy is the same at any tr as at td, apart from rounding.
         return
     if candidate.sign_match is False:
         quantity = "the deformations at tr and td have opposite directions"
@@ -386,7 +386,7 @@ def _judge_limits(verdict: PairVerdict) -> Iterator[Fault]:
 
 
 def _suggest_cure(verdict: PairVerdict) -> str:
-    """Suggest a tr that suits this td, or a better pair, or where to look for a pair.
+    """Suggest a tr that suits this td, or a better pair, or where to look for one.
 
     A td at which most of the vibration energy is lost has no suitable tr, so that D2R203 and this cure name one pair.
     """
@@ -404,11 +404,11 @@ def _suggest_cure(verdict: PairVerdict) -> str:
 
 
 def _loses_most(situation: Situation) -> bool:
-    """Return True if more than half of the vibration energy is kinetic at td, so that it is lost for every tr."""
+    """Return True if more than half of the vibration energy is kinetic at td, so that every tr would lose it."""
     share = situation.kinetic_share
     return share is not None and share > POOR_KINETIC_SHARE
 
 
 def _name_pair(pair: Pair) -> str:
-    """Return the advice to use a pair."""
+    """Return the advice to use this pair."""
     return f"use td = {pair.td:.6g} with tr = {pair.tr:.6g}"

@@ -453,13 +453,13 @@ def _describe_course(sensed: Sensed) -> str:
 
 
 def _describe_trigger(card: SwitchSet) -> str:
-    """Return the trigger of a switching card without a time; empty for other cards and ineffective triggers."""
+    """Return the trigger of a switching card without a time; empty for other cards and for triggers without effect."""
     if card.restart:
         return ""
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
     if card.kind == "plain" and not card.switched and not card.count_problem:
-        # This card switches nothing itself, but permits switches in a restart.
+        # This card itself switches nothing, but permits switches in a restart.
         return ""
     if card.kind == "plain":
         return "acts at the start of the run"

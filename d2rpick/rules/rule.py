@@ -1,4 +1,4 @@
-"""Build the rules of ``check``: the `Rule` type, its decorators, and the parts of decks that the examples use."""
+"""Define what the ``check`` rules are made of: the `Rule` type, its decorators, and deck fragments for the examples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Objection, Severity
 
 
-MAIN_DECK: Final = "main.k"  # File name of an example deck without another name.
+MAIN_DECK: Final = "main.k"  # Default file name of an example deck.
 
 HEAD = """\
 *KEYWORD
@@ -47,7 +47,7 @@ WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 
 
 class Example(NamedTuple):
-    """An example deck called ``name``, with the files that it includes or that belong to its run.
+    """An example deck called ``name``, with the files that it includes or that belong to the same run.
 
     ``history`` holds the arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the energy
     history for the check. ``options`` holds further arguments of ``d2rpick check``. If ``stdin`` is true, the deck is
@@ -74,14 +74,14 @@ class Rule(NamedTuple):
     summary: str
     explanation: str
     fix: str
-    # Function that finds the problems in a Case, or in a RunCase if the rule covers Radioss alone.
+    # Function that finds the problems in a Case, or in a RunCase if the rule applies only to Radioss.
     check: Callable[[Any], Iterable[Objection]]
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
     solvers: tuple[str, ...] = (LS_DYNA,)
 
 
-# The code below makes parts of LS-DYNA decks and Radioss runs for the examples.
+# The code below builds fragments of LS-DYNA decks and Radioss runs for the examples.
 
 
 def write_automatic_card(
@@ -137,7 +137,7 @@ def make_deck(*cards: str) -> Example:
 
 
 def make_window(tr: str, td: str, more: str = "") -> Example:
-    """Return a deck that switches part 1 to rigid at ``tr`` and back at ``td``, followed by the cards ``more``."""
+    """Return a deck that makes part 1 rigid at ``tr`` and deformable at ``td``, followed by the cards ``more``."""
     return make_deck(
         write_automatic_card(1, tr, rigid=["1"]),
         write_automatic_card(2, td, deformable=["1"]),
@@ -149,7 +149,7 @@ PASS = Example(GOOD)
 
 
 def write_starter_deck(group: str = GROUP, more: str = "") -> str:
-    """Return a starter deck with one part, which is a rigid body on a node group, followed by the text ``more``."""
+    """Return a starter deck with one part that is a rigid body on a node group, followed by the text ``more``."""
     head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
     return f"{head}{_SHELL}{_BODY}{group}{more}/END\n"
 
@@ -157,7 +157,7 @@ def write_starter_deck(group: str = GROUP, more: str = "") -> str:
 def write_engine_files(
     *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
 ) -> dict[str, str]:
-    """Return engine files, keyed by file name, for given end times and /RBODY cards (ON, OFF or none)."""
+    """Return engine files with the given end times and /RBODY cards (ON, OFF or none), keyed by file name."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
@@ -169,7 +169,7 @@ def write_engine_files(
 
 
 def make_run(files: dict[str, str], deck: str = "") -> Example:
-    """Return an example made of a starter deck and its engine files."""
+    """Return an example that consists of a starter deck and its engine files."""
     return Example(deck or write_starter_deck(), files, name="box_0000.rad")
 
 
@@ -179,7 +179,7 @@ GOOD_RUN: Final = make_run(write_engine_files(*WINDOW))
 def make_rule_decorator(
     id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
 ) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
-    """Return a decorator that turns a function that finds objections in a case into a rule.
+    """Return a decorator that makes a rule from a function that finds objections in a case.
 
     The docstring of the function is the explanation; its last paragraph, which begins with ``Fix:``, is the fix.
     """
@@ -196,10 +196,10 @@ def make_rule_decorator(
 
 
 def set_passing(*examples: Example) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the decks that pass a rule; the default is `GOOD`, or `GOOD_RUN` for Radioss."""
+    """Return a decorator that sets the decks that must pass a rule; default: `GOOD`, or `GOOD_RUN` for Radioss."""
     return lambda rule: rule._replace(passing=examples)
 
 
 def set_failing(*examples: Example) -> Callable[[Rule], Rule]:
-    """Return a decorator that sets the decks that fail a rule."""
+    """Return a decorator that sets the decks that must fail a rule."""
     return lambda rule: rule._replace(failing=examples)

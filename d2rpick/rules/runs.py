@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import RadiossLeg
     from d2rpick.deck.radioss_run import LeftRigid
 
-# Largest time step, as a fraction of the rigid window [-], because parts are released up to one time step late.
+# Largest time step, as a fraction of the rigid window [-]; the parts are released up to one time step late.
 _MOST_CAP = 0.01
-_MOST_LISTED = 8  # Largest number of main nodes that a message lists.
+_MOST_LISTED = 8  # Largest number of main nodes listed in a message.
 
 _MIXED: Final = {
     name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
@@ -41,13 +41,13 @@ _KEEPS: Final = (
     write_starter_deck()
     .partition("/GRNOD")[0]
     .replace("         7\n", "         7         1\n")
-)  # Starter deck with a rigid body that has Ikrem 1.
-# Arguments of `d2rpick replay` for a matsum history in which only the third part deforms.
+)  # Starter deck with a rigid body for which Ikrem is 1.
+# Arguments of `d2rpick replay` for a matsum history in which the third part alone deforms.
 _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
 def _write_row(*fields: float | str, width: int = 10) -> str:
-    """Return a line with the fields right-aligned in columns of this width."""
+    """Return a line whose fields are right-aligned in columns of the given width."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
@@ -71,7 +71,7 @@ def _write_wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
 
 
 def _write_velocity(group: int, speed: float = 10.0) -> str:
-    """Return an /INIVEL that gives the nodes of a group this speed."""
+    """Return an /INIVEL that gives this speed to the nodes of a group."""
     return (
         "/INIVEL/TRA/4\nthrown\n"
         + _write_row(speed, 0.0, 0.0, width=20)[:-1]
@@ -80,7 +80,7 @@ def _write_velocity(group: int, speed: float = 10.0) -> str:
 
 
 def _make_run_with(*more: str) -> Example:
-    """Return an example run that satisfies all rules, with the given additional cards in the starter deck."""
+    """Return an example run that passes all rules, with the given cards added to the starter deck."""
     return make_run(_LEGS, write_starter_deck(more="".join(more)))
 
 
@@ -94,7 +94,7 @@ def _make_started_run(state: str, *nodes: int) -> Example:
 def _make_wheel_run(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
-    """Return a run with a wheel as second rigid body; its first /RBODY/OFF also lists ``further_nodes``."""
+    """Return a run that has a wheel as a second rigid body; the first /RBODY/OFF also lists ``further_nodes``."""
     mesh = f"/PART/{part}\nwheel\n{_write_row(1, 1)}/SHELL/{part}\n{_write_row(2, 5, 6, 7, 8)}"
     wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_write_row(*members)}"
     body = "/RBODY/2\nwheel\n" + _write_row(1809, 0, 0, 0, "", 0, 6)
@@ -108,7 +108,7 @@ def _make_wheel_run(
 
 
 def _find_switching_legs(case: RunCase) -> list[RadiossLeg]:
-    """Return the engine runs if any of them switches a body; otherwise empty."""
+    """Return the engine runs if any of them switches a body, otherwise an empty sequence."""
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
@@ -345,7 +345,7 @@ def _check_step_limit(case: RunCase) -> Iterator[Objection]:
 
 
 def _has_deformable(case: RunCase, rigid: set[int]) -> bool:
-    """Return True if an element may lie outside the rigid parts, or if this cannot be determined."""
+    """Return True if an element may lie outside the rigid parts, or if this is unknown."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
     # Imported here to keep start-up fast.
@@ -378,7 +378,7 @@ def _check_versions(case: RunCase) -> Iterator[Objection]:
 
 
 def _report_flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
-    """Yield the flaws of the run that have the given code."""
+    """Yield those flaws of the run that have the given code."""
     for flaw in case.flaws:
         if flaw.code == code:
             yield flaw.place, flaw.message
@@ -440,7 +440,7 @@ def _check_left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 def _find_left_rigid_parts(
     case: RunCase,
 ) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
-    """Return the bodies that no engine run switches, with their deforming parts; None if these have no history."""
+    """Return the bodies that no engine run switches, with those of their parts that deform; None without a history."""
     # Imported here to keep start-up fast.
     from d2rpick.deck.radioss_run import find_left_rigid
 

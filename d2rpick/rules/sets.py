@@ -44,7 +44,7 @@ _WALL: Final = (
     "0.0       0.0       0.0\n"
 )
 _CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
-# Arguments of `d2rpick rollover` for the history of a box that lands on its edge and rattles.
+# Arguments of `d2rpick rollover` for the history of a box that lands on its edge and rattles there.
 _LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
 
 
@@ -130,7 +130,7 @@ def _check_pairs(case: Case) -> Iterator[Objection]:
         ):
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
-            # A problem that concerns both sets is reported only once, at one of them.
+            # A problem that concerns both sets is reported at only one of them.
             first = header.swset.value < partner.swset.value
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
@@ -180,7 +180,7 @@ def _find_units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
 
 
 def _describe_lone_problem(header: SwitchHeader) -> str:
-    """Describe what is wrong with RELSW and PAIRED in one header; empty if nothing is wrong."""
+    """Describe what is wrong with RELSW and PAIRED in one header; empty if both are right."""
     relsw = header.relsw.value
     paired = header.paired.value
     if relsw and not paired:
@@ -191,7 +191,7 @@ def _describe_lone_problem(header: SwitchHeader) -> str:
 
 
 def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
-    """Describe what is wrong with PAIRED or CODE in two sets that name each other; empty if nothing is wrong."""
+    """Describe what is wrong with PAIRED or CODE in two sets that refer to each other; empty if both are right."""
     ids = f"sets {first.swset.value} and {second.swset.value}"
     if first.paired.value == second.paired.value:
         return f"{ids} both have PAIRED {first.paired.value}"
@@ -209,7 +209,7 @@ def _describe_mismatch(first: SwitchHeader, second: SwitchHeader) -> str:
 )
 @make_rule_decorator("D2R006", WARNING, "PAIRED together with CODE 0")
 def _check_timed_pairs(case: Case) -> Iterator[Objection]:
-    """A pair acts in turn by a force. Two unpaired sets are enough for a window that is defined by times (CODE 0).
+    """The sets of a pair act in turn on a force. Two unpaired sets suffice for a window defined by times (CODE 0).
 
     Fix: Set PAIRED and RELSW to 0.
     """
@@ -227,7 +227,7 @@ def _check_timed_pairs(case: Case) -> Iterator[Objection]:
 
 
 def _find_force_headers(case: Case, codes: set[int]) -> Iterator[SwitchHeader]:
-    """Yield the readable headers with one of the given CODEs."""
+    """Yield the readable headers whose CODE is one of the given ones."""
     for _, header in case.headers:
         if (
             not header.code.problem
@@ -327,7 +327,7 @@ def _check_entity_triggers(case: Case) -> Iterator[Objection]:
 
 
 def _list_entities(entities: Entities) -> str:
-    """Return the contacts or walls as text, each with its id, keyword and title."""
+    """Return the contacts or walls as text, with their ids, keywords and titles."""
     texts = [
         f"{entity.id or entity.number} (*{entity.keyword}{f' {entity.title!r}' if entity.title else ''})"
         for entity in entities.found
@@ -336,7 +336,7 @@ def _list_entities(entities: Entities) -> str:
 
 
 def _make_sensor_deck(control: str) -> Example:
-    """Return a deck whose switch set has CODE 5, with the given *SENSOR_CONTROL."""
+    """Return a deck whose switch set has CODE 5 and the given *SENSOR_CONTROL."""
     return make_deck(
         control + write_automatic_card(20, "0.0", rigid=["1"], code=BY_SENSOR)
     )
@@ -392,7 +392,7 @@ def _find_controlled(card: Card) -> Iterator[int]:
 
 
 def _make_delayed_deck(wait: str) -> Example:
-    """Return a deck with a pair of sets; ``wait`` is TIME3 of the set that makes parts deformable."""
+    """Return a deck with a pair of sets; ``wait`` is TIME3 of the set that makes the parts deformable."""
     rigid_card = write_automatic_card(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
     back_card = write_automatic_card(
         2, "0.0", deformable=["1"], code=4, pair=(1, -1), delay=wait
@@ -447,8 +447,8 @@ def _check_entity_named(case: Case) -> Iterator[Objection]:
 
 
 def _make_landing_deck(wait: str) -> Example:
-    """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
-    # This deck has the ENDTIM of the history.
+    """Return a deck with a pair of sets, and the history of the landing box; ``wait`` is TIME3."""
+    # ENDTIM of this deck is that of the history.
     landed = _make_delayed_deck(wait).deck.replace("       0.2", "       0.7", 1)
     return Example(landed, history=_LANDING, computed_by="rollover")
 

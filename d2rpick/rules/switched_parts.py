@@ -1,4 +1,4 @@
-"""Define rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and their attachments."""
+"""Define rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120 on switched parts and their attachments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.ls_dyna_parts import Constraint
     from d2rpick.deck.switching import Switched, SwitchEvent, SwitchSet, Unit
 
-_NEAREST = 3  # Largest number of part ids that a message suggests for an unknown id.
+_NEAREST = 3  # Largest number of part ids that are suggested for an unknown id.
 
 _LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
@@ -37,7 +37,7 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
-_DELETED = 1  # Value of NRBF and NCSF for which a card deletes constraints.
+_DELETED = 1  # Value of NRBF or NCSF with which a card deletes constraints.
 _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
@@ -56,7 +56,7 @@ _JOINING: Final = (
 
 
 def _make_touching_deck(*lines: str) -> Example:
-    """Return a deck whose two parts share nodes; ``lines`` are the D2R lines of the first card."""
+    """Return a deck with two parts that share nodes; ``lines`` are the D2R lines of the first card."""
     rigid_card = write_automatic_card(1, "0.02", rigid=lines)
     return make_deck(
         _TOUCHING + rigid_card + write_automatic_card(2, "0.09", deformable=["1", "2"])
@@ -79,13 +79,13 @@ _LAYERS, _BEAMS = (
 
 
 def _make_constrained_deck(text: str, flags: str = "         0         0") -> Example:
-    """Return a deck with a constraint on a node of part 1; its card has ``flags``, the values of NRBF and NCSF."""
+    """Return a deck with a constraint on a node of part 1; ``flags`` are the values of NRBF and NCSF on its card."""
     rigid_card = THERE.replace(_COUNTS, flags + _COUNTS[20:])
     return make_deck(_MESH + _SET + text + rigid_card + BACK)
 
 
 def _make_solid_deck(elform: str, tr: str = "0.02") -> Example:
-    """Return a deck whose part 1 is a solid with this ELFORM; a card makes it rigid at ``tr``."""
+    """Return a deck in which part 1 is a solid with this ELFORM that a card makes rigid at ``tr``."""
     cards = write_automatic_card(1, tr, rigid=["1"]) + BACK
     return make_deck(f"*SECTION_SOLID\n         1{elform:>10s}\n" + cards)
 
@@ -107,7 +107,7 @@ def _group_by_card(
 
 
 def _has_unknown_members(case: Case, *, to_rigid: bool) -> bool:
-    """Return True if the deck switches a part set of unknown parts, which may contain any part."""
+    """Return True if the deck switches a part set whose parts are unknown and may therefore be any parts."""
     return any(
         event.unit.is_set and event.line.to_rigid == to_rigid
         for event in case.windows.events
@@ -242,7 +242,7 @@ def _check_ids_exist(case: Case) -> Iterator[Objection]:
 
 
 def _list_nearest(number: int, parts: DeckParts) -> str:
-    """Return the nearest part ids of the deck with their titles, as text in brackets."""
+    """Return the closest part ids in the deck with their titles, as text in brackets."""
     from heapq import nsmallest  # Imported here to keep start-up fast.
 
     near = sorted(
@@ -256,7 +256,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield the kind and id of each part set, part or lead part that a line names but the deck does not define."""
+    """Yield the kind and id of each part set, part or lead part that a line names and the deck does not define."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -345,7 +345,7 @@ def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
 
 
 def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
-    """Return True if two parts or sets may be rigid at the same time, which is assumed if a force switches them."""
+    """Return True if two parts or sets may be rigid at the same time; this is assumed if a force switches them."""
     if {first, second} & case.windows.other_rigid:
         return True
     far = float("inf")
@@ -361,7 +361,7 @@ def _is_rigid_together(case: Case, first: Unit, second: Unit) -> bool:
 
 
 def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
-    """Yield constraints on parts that a card makes rigid without deleting the constraints."""
+    """Yield constraints on parts that a card makes rigid without deleting these constraints."""
     switched = _find_left_active(case, nodal=nodal)
     constraints = [
         constraint
@@ -398,7 +398,7 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
 def _find_parts_of_nodes(
     case: Case, constraints: Sequence[Constraint]
 ) -> dict[int, set[int]]:
-    """Return, by node id, all parts whose elements contain a node of the constraints."""
+    """Return all parts whose elements contain a node of the constraints, keyed by node id."""
     cards = find_element_cards(case.deck, searched=True) if constraints else ()
     if not cards:
         return {}
@@ -419,7 +419,7 @@ def _find_held_parts(
 
 
 def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` that contains each node, keyed by node id."""
+    """Return the first of ``parts`` to which each node belongs, keyed by node id."""
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
@@ -430,7 +430,7 @@ def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
 
 
 class _Flags(NamedTuple):
-    """The flags NRBF and NCSF of a card that makes parts rigid, and the field of the first flag."""
+    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first flag."""
 
     nrbf: int
     ncsf: int
@@ -438,7 +438,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; in a restart, they are on *RIGID_DEFORMABLE_CONTROL. A plain card has no flags."""
+    """Return the flags of a card; restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have no flags."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -507,7 +507,7 @@ def _check_unturned_stresses(case: Case) -> Iterator[Objection]:
 
 
 def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
-    """Yield the parts that must not be switched although a card makes them rigid at some time."""
+    """Yield the parts that must not be switched but that a card makes rigid at some time."""
     if case.sets:
         reasons = {
             part: unswitchable.reason
@@ -532,7 +532,7 @@ def _report_unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
 
 
 def _make_law_deck(law: str) -> Example:
-    """Return a deck in which part 1 has the material law of the given keyword."""
+    """Return a deck in which part 1 has the material law with the given keyword."""
     return make_deck(
         f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK
     )

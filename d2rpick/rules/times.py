@@ -1,4 +1,4 @@
-"""Define rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210: the times of windows."""
+"""Define rules D2R101-102, D2R105, D2R111, D2R114-115, D2R201-207 and D2R209-210 on the times of windows."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-# Smallest number of output intervals in a rigid window for which crossings are found to within 0.5 % of the window.
+# Smallest number of output intervals in a rigid window; they resolve crossings to within 0.5 % of the window.
 _INTERVALS = 200
-# Largest relative excess of an output interval over its limit that is treated as rounding [-].
+# If an output interval exceeds its limit by at most this fraction, the difference is attributed to rounding [-].
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
-# Largest number of cards in a deck for which D2R102 and D2R105 would report the same mistake twice.
+# Up to this number of cards, D2R102 and D2R105 would report the same mistake twice.
 _FEW = 2
 _SECOND: Final = write_automatic_card(3, "0.1", rigid=["2"]) + write_automatic_card(
     4, "0.1", deformable=["2"]
 )
 
-_DECADES = 3.0  # Number of powers of ten between two adjacent units of time.
-# Tolerance for the ratio of end times, as a power of ten [-]; a reference run may end at half of the time.
+_DECADES = 3.0  # Powers of ten between adjacent time units
+# Tolerance for the ratio of end times, as a power of ten [-]; a reference run may be half as long as the run.
 _NEAR = math.log10(2)
 _HISTORY: Final = (
     "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -110,7 +110,7 @@ def _check_times_in_run(case: Case) -> Iterator[Objection]:
 def _group_closed_windows(
     case: Case,
 ) -> dict[tuple[SwitchSet, SwitchSet], list[SwitchWindow]]:
-    """Return the windows with both ends, keyed by the cards that open and close them."""
+    """Return the windows that have both ends, keyed by the cards that open and close them."""
     return group_values(
         ((window.opened.by, window.closed.by), window)
         for window in case.windows.windows
@@ -119,12 +119,12 @@ def _group_closed_windows(
 
 
 def _name_parts(windows: Sequence[SwitchWindow]) -> str:
-    """Return the ids of the parts in some windows as text."""
+    """Return the part ids in some windows as text."""
     return name_units(window.unit.id for window in windows)
 
 
 def _is_lost(window: SwitchWindow) -> bool:
-    """Return True if both times of a window are 0."""
+    """Return True if both times of a window are zero."""
     return window.tr == 0 == window.td
 
 
@@ -227,7 +227,7 @@ def _check_sampling(case: Case) -> Iterator[Objection]:
 
 
 def _find_timed(case: Case) -> list[tuple[SwitchSet, SwitchHeader]]:
-    """Return the cards with CODE 0 whose time is known, with their headers."""
+    """Return the CODE 0 cards with a known time, with their headers."""
     return [
         (card, header)
         for card, header in case.headers
@@ -275,7 +275,7 @@ def _check_equal_times(case: Case) -> Iterator[Objection]:
 
 
 def _find_mixed_units(times: list[float], end: float, run_end: str) -> str | None:
-    """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000; else None.
+    """Return a message if only times multiplied by 1000 or 1/1000 would fit a run up to ``end``, otherwise None.
 
     ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
@@ -326,7 +326,7 @@ def _check_units_of_deck(case: Case) -> Iterator[Objection]:
 def _make_pair_deck(
     tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY
 ) -> Example:
-    """Return a deck with one window for part 1, checked by a history of `d2rpick replay` with these arguments."""
+    """Return a deck with one window for part 1, checked with a history of `d2rpick replay` for these arguments."""
     rigid_card = write_automatic_card(1, tr, rigid=["1"])
     back_card = write_automatic_card(2, td, deformable=["1"])
     return Example(
@@ -338,7 +338,7 @@ _PASSING: Final = (_make_pair_deck(*_GOOD_PAIR),)
 
 
 def _report_faults(case: Case, rule_id: str) -> Iterator[Objection]:
-    """Yield the problems of one rule that the energy history shows; parts on one card share a problem."""
+    """Yield the problems of one rule in the energy history; parts on the same card share a problem."""
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window, judgement in case.judgements:
         for fault in judgement.faults:

@@ -1,1 +1,1 @@
-"""Follow runs while they are computed: what their states show so far, and what to do next."""
+"""Follow runs while they are being computed: find what their states show so far, and decide what to do next."""

@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches its parts by itself, one engine run (leg) after another."""
+"""Drive a Radioss run that chooses its own switching times, one engine run (leg) after another."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
 
 JOURNAL: Final = "drive.ndjson"
 # Largest time step of a rigid engine run, relative to the mean time step of the deformable engine runs [-].
-# With 5 times the time step, a rigid engine run costs a few percent of a deformable one and resolves its contacts.
+# With this time step, a rigid engine run costs a few percent of a deformable one and still resolves contacts.
 _STEP_RATIO: Final = 5.0
-# Smallest duration of a reported flight that is too short to be switched, as a fraction of the required time [-].
+# A flight too short to be switched is reported if it lasts at least this fraction of the required time [-].
 _REPORTED: Final = 0.5
 # _PAUSE: time between two checks of the solver [s].
-# _SILENT: time without output after which the silence of the solver is reported [s].
+# _SILENT: time without solver output after which the driver reports this silence [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
@@ -77,7 +77,7 @@ class Driven:
 
 @dataclass
 class Driver:
-    """Computes one run in its folder, and continues after the last record of its journal.
+    """Computes one run in its folder, continuing after the last record of its journal.
 
     ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
@@ -91,7 +91,7 @@ class Driver:
     at: Order | None = None
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless this has already been done.
+        """Copy the deck into the folder and run the starter, unless an earlier driver has already done this.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Driver:
         self._wait_for_end()  # An earlier driver may have left a solver running.
         if self.journal.has("prepared") and self.solver.whole(0):
             return
-        # The first engine file is needed now, because the starter reads /RBODY/OFF from it.
+        # The first engine file is needed at this point, because the starter reads /RBODY/OFF from it.
         engine_file = self.solver.file(1, ".rad").name
         files = {engine_file: self.deck.leg(1, self.deck.end, None), **self.deck.files}
         for name, content in files.items():
@@ -117,7 +117,7 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Describe the engine run being computed, or how many ``seconds`` the starter has taken before the first."""
+        """Describe the engine run being computed, or how many ``seconds`` the starter has run before the first one."""
         leg = self.at
         if leg is None:
             return f"starting ... {seconds:.0f} s"
@@ -136,11 +136,11 @@ class Driver:
                 f"resumed: {len(legs)} engine runs are done, the last until {legs[-1].order.until:.6g}"
             )
             if self.journal.has_failed:
-                # The restart file may be damaged although it looks complete.
+                # A restart file that looks complete may still be damaged.
                 self._go_back("the engine run after it has failed")
         while order := self._choose_next():
             self.at = order
-            # An earlier driver may have begun the engine run, and the solver may have finished it since.
+            # An earlier driver may have started the engine run, and the solver may have finished it since then.
             begun = self.journal.records[-1].get("order") == [*order]
             if not begun or self._find_problem(order):
                 self._start(order)
@@ -152,7 +152,7 @@ class Driver:
         self.at = None
 
     def _choose_next(self) -> Order | None:
-        """Choose the next engine run. If its restart file is damaged, go back to a complete restart file."""
+        """Choose the next engine run. If its restart file is damaged, go back to an intact restart file."""
         legs = self.journal.legs
         order = choose_next_leg(legs, self.limits)
         if order is None or not legs or self.solver.whole(order.number - 1):
@@ -168,7 +168,7 @@ class Driver:
         self.told(f"the last engine run is computed again from {start:.6g}: {reason}")
 
     def _start(self, order: Order) -> None:
-        """Write the engine file of an engine run, and start the engine."""
+        """Write the engine file of an engine run and start the engine."""
         number = order.number
         self.solver.check_room(number)
         self.solver.clear(number)
@@ -184,7 +184,7 @@ class Driver:
         )
 
     def _wait_for_end(self) -> None:
-        """Wait until no solver is running; report silence, and stop the solver on KeyboardInterrupt."""
+        """Wait until no solver is running; report silence, and stop the solver after a KeyboardInterrupt."""
         reported_at = _SILENT
         try:
             while self.solver.alive:
@@ -201,7 +201,7 @@ class Driver:
             raise
 
     def _find_problem(self, order: Order) -> str:
-        """Return why an engine run has failed; empty if it ended normally, with complete restart files and history."""
+        """Return why an engine run failed; empty if it ended normally, with complete restart files and history."""
         number = order.number
         if not self.solver.ended_well(number):
             return f"the solver failed: {self.solver.last_words(number)}; continue with --resume"
@@ -213,7 +213,7 @@ class Driver:
         return "the engine run left no complete restart file; make room on the disk, then --resume"
 
     def _recover(self, order: Order, problem: str) -> None:
-        """Record in the journal that an engine run has failed; if its files are incomplete, it is computed again once.
+        """Record in the journal that an engine run failed; if its files are incomplete, it is computed once more.
 
         Raises
         ------
@@ -245,13 +245,13 @@ class Driver:
                 self.told(f"warning: out-of-place: {window.warning}")
         kept_restarts = {number, number - 1, number - 2}
         if order.rigid:
-            # The restart file from before the window is needed if the window is not used after all.
+            # The restart file from before the window is needed in case the window is not used after all.
             kept_restarts.add(first.number - 1)
         self.solver.keep(kept_restarts)
 
 
 def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | None:
-    """Return the largest time step of a rigid engine run, from the smallest mean step of the deformable ones [time]."""
+    """Return the largest time step of a rigid engine run [time], from the smallest mean step of the deformable ones."""
     if not order.rigid:
         return None
     steps = [
@@ -262,7 +262,7 @@ def _limit_step(order: Order, legs: Sequence[Leg], interval: float) -> float | N
 
 
 def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
-    """Return the longest waiting time of the earlier engine runs in which parts vibrated [time]."""
+    """Return the longest waiting time of those earlier engine runs in which parts vibrated [time]."""
     waits = [
         leg.findings.wait or 0.0
         for leg in legs
@@ -272,7 +272,7 @@ def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
 
 
 def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
-    """Return the findings at the end of an engine run from the evidence of all engine runs that are joined to it."""
+    """Return the findings at the end of an engine run, from the evidence of all engine runs joined to it."""
     if order.rigid:
         return LegFindings(contact=evidence.find_contact())
     history = evidence.history
@@ -287,7 +287,7 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     wait = evidence.find_wait(free, history.end)
     if wait is None:
         return findings
-    # These flights were slightly too short to be switched.
+    # These flights were only slightly too short to be switched.
     short_flights = tuple(
         (start, end)
         for start, end in evidence.pauses(order.start)
@@ -309,7 +309,7 @@ def _choose_end(order: Order, history: History, free: float) -> float:
 
 
 class Journal:
-    """The journal of a driven run. Records are only appended, and each is on the disk when `add` returns.
+    """The journal of a driven run. Records are only appended, and each record is on the disk when `add` returns.
 
     A cut or damaged line is ignored: what it reports is done again.
     """
@@ -324,7 +324,7 @@ class Journal:
 
     @property
     def legs(self) -> list[Leg]:
-        """Computed engine runs, except those that were undone by a restart from an earlier time."""
+        """Computed engine runs, except those undone by a restart from an earlier time."""
         legs: list[Leg] = []
         for record in self.records:
             if record["event"] == "ended":
@@ -342,7 +342,7 @@ class Journal:
         return [event for event in events if event != "started"][-1:] == ["failed"]
 
     def has(self, event: str) -> bool:
-        """Return True if the journal contains a record of the named event."""
+        """Return True if the journal contains a record of the given event."""
         return any(record["event"] == event for record in self.records)
 
     def add(self, event: str, **values: Any) -> None:

@@ -1,4 +1,4 @@
-"""Start and stop the processes of a solver in the folder of a run, and read their output.
+"""Start and stop the solver processes in the folder of a run, and read their output.
 
 The names and first bytes of restart files were observed in runs with OpenRadioss 2026-08.
 """
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Paths of the programs in an installation, and their arguments, keyed by program.
+# Paths of the programs in an installation and their arguments, keyed by program.
 _PROGRAMS: Final = {
     "starter": (
         ("bin/starter_gf", "exec/starter_linux64_gf"),
@@ -43,29 +43,29 @@ _PROGRAMS: Final = {
 }
 _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = r"(?m)^ *[1-9]\d* +ERROR\(S\)"
-# Number of bytes that are read from the end of a listing.
+# Number of bytes that are read at the end of a listing.
 _TAIL_SIZE: Final = 1 << 14
-# Number of bytes read from the end of a listing to find errors; in a starter listing, much output follows them.
+# Number of bytes that are read at the end of a listing to find errors, which much output follows in a starter listing.
 _LISTING_SIZE: Final = 1 << 22
-# An error in a listing: its first line and the next three.
+# An error in a listing consists of its first line and the next three lines.
 _ERROR_LINES: Final = r".*\*\* ERROR.*(?:\n.*){0,3}"
 _MOST_LINES: Final = 8
-# Smallest size of a complete restart file, as a fraction of the size of the starter's restart file [-].
+# Smallest size of a complete restart file, relative to the size of the starter's restart file [-].
 _WHOLE: Final = 0.98
-# _TIME_TO_STOP: time that a solver is given to stop by itself [s].
-# _PAUSE: time between two checks whether the solver has stopped [s].
+# _TIME_TO_STOP: time that a solver is given to stop on its own [s].
+# _PAUSE: time between two checks of whether the solver has stopped [s].
 _TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
-    """The commands of starter and engine, by default those of the installation, and the number of threads."""
+    """The commands of the starter and the engine, by default those of the installation, and the thread count."""
 
     starter: str | None = None
     engine: str | None = None
     threads: int = 1
 
     def words(self, program: str, deck: str) -> list[str]:
-        """Split the command that starts a program on a deck, as a shell would.
+        """Split the command that starts a program on a deck as a shell would.
 
         Raises
         ------
@@ -84,13 +84,13 @@ class Commands(NamedTuple):
                 f"--{program} {template!r}: cannot be split into words ({error})"
             ) from None
         if "/" in words[0]:
-            # The path is made absolute, because the program is started in another folder.
+            # The path is made absolute, because the program is started in a different folder.
             words[0] = str(Path(words[0]).absolute())
         words = [word.replace("{threads}", str(self.threads)) for word in words]
         return [word.replace("{deck}", deck) for word in words]
 
     def make_environment(self) -> dict[str, str]:
-        """Return the environment of the programs: the current one, with the variables of an installation."""
+        """Return the environment of the programs, which is the current one plus the variables of an installation."""
         environment = {"OMP_NUM_THREADS": str(self.threads), "OMP_STACKSIZE": "400m"}
         libraries = os.environ.get("LD_LIBRARY_PATH", "")
         if home := os.environ.get(_HOME):
@@ -99,7 +99,7 @@ class Commands(NamedTuple):
         return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
     def missing(self) -> str:
-        """Return the first program that cannot be started; empty if all can be started."""
+        """Return the first program that cannot be started; empty if all of them can."""
         for program in _PROGRAMS:
             executable = self.words(program, "{deck}")[0]
             if shutil.which(executable) is None:
@@ -108,7 +108,7 @@ class Commands(NamedTuple):
 
 
 def _find_installed(program: str) -> str:
-    """Return the command of a program of the installation; raise ConfigurationError if it is not installed."""
+    """Return the command of an installed program; raise ConfigurationError if it is not installed."""
     home = os.environ.get(_HOME, "")
     names, arguments = _PROGRAMS[program]
     for name in names:
@@ -135,7 +135,7 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int | None:
-    """Lock a file, and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
+    """Lock a file and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -148,7 +148,7 @@ def _lock(path: Path) -> int | None:
 
 
 class Solver:
-    """The solver in the folder of a run, one process at a time.
+    """The solver in the folder of a run; only one process runs at a time.
 
     The process keeps a lock while it lives, so that a later driver can see it.
     """
@@ -160,11 +160,11 @@ class Solver:
         self._signal = 0  # Number of the signal that ended the last process, or 0.
 
     def file(self, number: int, suffix: str) -> Path:
-        """Return the path of a file of an engine run; number 0 is the starter."""
+        """Return the path of a file of an engine run; the number 0 stands for the starter."""
         return self.folder / f"{self.name}_{number:04d}{suffix}"
 
     def history(self, number: int) -> Path:
-        """Return the path of the time history of an engine run."""
+        """Return the path of the time history that an engine run writes."""
         return self.folder / f"{self.name}T{number:02d}"
 
     def clear(self, number: int) -> None:
@@ -183,13 +183,11 @@ class Solver:
         """
         command = self.commands.words(program, self.file(number, ".rad").name)
         lock = _lock(self._lock_path)
-        assert (
-            lock is not None
-        )  # The driver has waited for the end of any other solver.
+        assert lock is not None  # The driver has waited for any other solver.
         try:
             _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:
-                # A new session keeps Ctrl-C from the solver, because the driver itself stops all its processes.
+                # A new session shields the solver from Ctrl-C; the driver itself stops all solver processes.
                 self._process = subprocess.Popen(
                     command, cwd=self.folder, env=self.commands.make_environment(), stdin=subprocess.DEVNULL,
                     stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
@@ -217,7 +215,7 @@ class Solver:
         return lock is None
 
     def end(self) -> None:
-        """Stop the solver with all its processes, even if an earlier driver started it."""
+        """Stop all processes of the solver, even if an earlier driver started it."""
         text = self._lock_path.read_bytes() if self._lock_path.exists() else b""
         for sign in (signal.SIGTERM, signal.SIGKILL):
             if not self.alive or not text.isdigit():
@@ -225,7 +223,7 @@ class Solver:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            # A second interrupt by the user must not leave processes running.
+            # A second interrupt by the user must not leave any process running.
             with suppress(KeyboardInterrupt):
                 while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
@@ -242,13 +240,13 @@ class Solver:
         return "NORMAL TERMINATION" in self._read_end(number, ".out")
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Return cycles and CPU time [s] of an engine run; None if its listing does not contain them."""
+        """Return the cycle count and CPU time [s] of an engine run; None if its listing does not contain them."""
         path = str(self.file(number, ".out"))
         timing = find_radioss_timing(path, read_tail(path, _TAIL_SIZE))
         return (timing.cycles or None, timing.total or None) if timing else (None, None)
 
     def whole(self, number: int) -> bool:
-        """Return True if an engine run, or the starter (number 0), has left complete restart files of all domains.
+        """Return True if an engine run, or the starter (number 0), has left complete restart files for all domains.
 
         An OpenRadioss restart file begins with its own name.  It is as long as the starter's file, apart from contact
         data.  A full disk leaves shorter restarts although the listing reports a normal end.
@@ -272,12 +270,12 @@ class Solver:
             return np.empty(0)
 
     def started_well(self) -> bool:
-        """Return True if the starter has ended without an error and left a complete restart file."""
+        """Return True if the starter ended without an error and left a complete restart file."""
         has_error = re.search(_STARTER_ERROR, self._read_end(0, ".out"))
         return self.whole(0) and not has_error
 
     def last_words(self, number: int) -> str:
-        """Return in one line the errors that the solver reported, or else the last lines that it printed."""
+        """Return, on one line, the errors that the solver reported or, without errors, its last printed lines."""
         listing = self._read_end(number, ".out", _LISTING_SIZE)
         errors = _split_lines("\n".join(re.findall(_ERROR_LINES, listing)))
         printed = _split_lines(self._read_end(number, ".log") or listing)
@@ -292,7 +290,7 @@ class Solver:
         return make_printable("; ".join(words))
 
     def keep(self, numbers: Collection[int]) -> None:
-        """Remove all restart files except those of the given engine runs and of the starter."""
+        """Remove all restart files except those of the given engine runs and the starter."""
         for number in {*range(1, MOST_LEGS + 1)} - {*numbers}:
             for restart in self._find_restarts(number):
                 restart.unlink()
@@ -308,22 +306,22 @@ class Solver:
             )
 
     def _read_end(self, number: int, suffix: str, size: int = _TAIL_SIZE) -> str:
-        """Return the last bytes of a file of an engine run as text; empty if the file is missing."""
+        """Return the last bytes of a file of an engine run as text; empty if there is no such file."""
         return read_tail(str(self.file(number, suffix)), size).decode("latin-1")
 
     def _find_restarts(self, number: int | None = None) -> list[Path]:
-        """Return the restart files of an engine run, one for each domain, or those of all engine runs."""
+        """Return the restart files of an engine run, one per domain, or those of all engine runs."""
         leg = "*" if number is None else f"{number:04d}"
         return [*self.folder.glob(f"{self.name}_{leg}_*.rst")]
 
     def _measure_largest_restart(self) -> int:
-        """Return the size of the largest restart file of the run [bytes]; 0 if there is no restart file."""
+        """Return the size of the largest restart file of the run [bytes]; 0 if there is none."""
         sizes = [restart.stat().st_size for restart in self._find_restarts()]
         return max(sizes, default=0)
 
 
 def _split_lines(text: str) -> list[str]:
-    """Return the lines of an output without needless blanks; lines without content are left out."""
+    """Return the lines of an output without redundant spaces; lines without content are left out."""
     return [" ".join(line.split()) for line in text.splitlines() if line.strip(" -*")]
 
 
@@ -333,7 +331,7 @@ def _has_its_name(restart: Path) -> bool:
 
 
 def _raise_stack_limit() -> None:
-    """Raise the stack limit to the maximum of the system, because the solver keeps large arrays on the stack."""
+    """Raise the stack limit to the system maximum, because the solver keeps large arrays on the stack."""
     import resource
 
     _, limit = resource.getrlimit(resource.RLIMIT_STACK)

@@ -1,4 +1,4 @@
-"""Find the events of a run so far: pushes, flights, contacts, advised switches, and rigid parts."""
+"""Find the events of a run so far: pushes, flights, contacts, advised switches, and switches to rigid."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from d2rpick.running.evidence import GrowingEvidence
     from d2rpick.running.witness import Quiet
 
-# Smallest height of the internal energy above its recent minimum at a good tr, as a fraction of its recent range [-].
-# In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak at least 90 %.
+# Smallest height of the internal energy above its recent minimum at a good tr, relative to its recent range [-].
+# In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak 90 % or more.
 _HIGH: Final = 0.75
 _RIGID: Final = (
     "parts have become rigid: part data are not used until they deform again"
@@ -26,7 +26,7 @@ _RIGID: Final = (
 
 
 class Event(NamedTuple):
-    """An event: a stable word, its time, the state at which it was ``seen`` [time], and a sentence.
+    """An event: a keyword for scripts, its time, the state at which it was ``seen`` [time], and a sentence.
 
     ``wait`` is the force-free time that shows a flight [time].  ``left`` is the change in that time, as a share of the
     largest value.  ``tr`` is the advised time [time].  Each is None if it does not apply to the event.
@@ -42,7 +42,7 @@ class Event(NamedTuple):
 
 
 def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
-    """Return all events in the order in which they were detected.
+    """Return all events in the order of their detection.
 
     The events of a run so far are the first ones of the whole run.  The evidence keeps those of past flights.
 
@@ -60,14 +60,14 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
             check_wait(flight.wait.time, longest, ", ".join(history.source))
         events += _describe_flight(flight, evidence)
     for start, seen_at, end in evidence.find_rigid_times():
-        # No switch is advised if the parts are already rigid.
+        # No switch is advised while the parts are rigid.
         events = [
             event
             for event in events
             if event.tr is None or not start <= event.tr <= end
         ]
         if start <= history.time[:FEWEST][-1]:
-            continue  # Such bodies are always rigid.
+            continue  # These bodies are always rigid.
         events.append(Event("rigid", start, seen_at, _RIGID))
         if end < history.end:
             events.append(Event("deformable", end, end, "all parts deform again"))
@@ -79,7 +79,7 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
 
 
 def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event]:
-    """Yield the events of a flight: its start, the advised switch, and its contact."""
+    """Yield the events of a flight: its start, the advised switch, and the contact that ends it."""
     key = flight.start, flight.seen
     events = evidence.decided.get(key)
     if events is None:
@@ -150,7 +150,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts oscillate too much in a flight that has lasted up to tr; otherwise empty."""
+    """Return a warning if parts oscillate too strongly in a flight that has lasted up to tr; otherwise empty."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

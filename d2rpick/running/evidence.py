@@ -1,4 +1,4 @@
-"""Find the flights of given parts in a growing record.
+"""Find the flights of the given parts in a growing record.
 
 Each result depends only on the states up to its time, not on when the record was read.  A growing record therefore
 has the same flights as the finished one.
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import MovingParts
 
-# Largest number of states from which gravity is determined.
+# Largest number of states used to determine gravity.
 _GRAVITY_STATES: Final = 1000
-# An internal energy below this share of the kinetic energy is round-off and shows no vibration [-].
+# An internal energy below this fraction of the kinetic energy is round-off and shows no vibration [-].
 _ROUND_OFF: Final = 1e-6
 
 
 class GrowingEvidence:
-    """Finds the force-free time and the flights of the parts of a growing record.
+    """Finds the force-free time and the flights of the parts in a growing record.
 
     ``given`` is the user's waiting time [time], ``of_deck`` and ``before`` are those of the inner ``motion``.
     """
@@ -50,9 +50,9 @@ class GrowingEvidence:
         # Events of past flights, keyed by the start of the flight and the time at which it was detected.
         self.decided: dict[tuple[float, float], tuple[Any, ...]] = {}
         self.motion = InnerMotion(of_deck, before)
-        # Evidence for each set of parts, followed by that for the model if its momentum or contact energy is known.
+        # Evidence for each set of parts, and last for the model if its momentum or its contact energy is known.
         self.witnesses: list[GrowingWitness] = []
-        # Evidence that still grows, keyed by its parts; the key of the whole model is None.
+        # Evidence that still grows, keyed by its parts, or by None for the whole model.
         self._going_on: dict[tuple[Part, ...] | None, GrowingWitness] = {}
         self._first_momenta: Samples | None = None
         self._has_moved, self._largest_momentum = RunningMaximum(), 0.0
@@ -60,7 +60,7 @@ class GrowingEvidence:
         self._complete = GrowingColumn()
 
     def take(self, states: History, history: History) -> None:
-        """Append states, which must have the same quantities as the states so far; ``history`` are all states."""
+        """Append states, which must have the same quantities as the states so far; ``history`` contains all states."""
         self.history = history
         contact = states.balance
         if contact is not None and contact.sliding is None:
@@ -78,7 +78,7 @@ class GrowingEvidence:
     def _add_parts(
         self, momenta: Momenta, of_model: Momenta | None, contact: Balance | None
     ) -> MovingParts:
-        """Append part momenta to the evidence for all sets of parts that may fly together, and return the moving parts.
+        """Append part momenta to the evidence for each set of parts that may fly together, and return the moving parts.
 
         The evidence of a set ends at a state at which the part momenta do not add up to the momentum of the model, as
         when a rigid body has absorbed some parts.
@@ -95,8 +95,8 @@ class GrowingEvidence:
         has_moved = self._has_moved.add(changed)
         for members in dict.fromkeys(_list_sets(momenta)):
             columns = _make_columns(members, momenta, contact)
-            # Contact energy shows collisions between bodies, which do not change the total momentum.
-            # Once other parts move, the contact energy includes their contacts, and is no longer used.
+            # The contact energy shows collisions between bodies, which do not change the total momentum.
+            # Once other parts move, the contact energy includes their contacts and is no longer used.
             other_parts = np.delete(has_moved, members, axis=1)
             columns[other_parts.any(axis=1), 1] = np.nan
             columns[~are_complete, 2:] = np.nan
@@ -116,7 +116,7 @@ class GrowingEvidence:
         columns: Samples,
         written: tuple[Momenta | None, Balance | None],
     ) -> None:
-        """Append states to the evidence for a set of parts; after states without momentum, the evidence starts again.
+        """Append states to the evidence for a set of parts; after states without momentum, start the evidence anew.
 
         ``columns`` are those of `GrowingWitness.add`, from the ``written`` momenta and energies.
         """
@@ -132,7 +132,7 @@ class GrowingEvidence:
             self._going_on.pop(parts, None)
 
     def flights(self) -> tuple[Quiet, ...]:
-        """Return all flights that lasted for their required force-free time, in ascending order.
+        """Return all flights that lasted for the required force-free time, in ascending order.
 
         As the run goes on, flights are only added, and the last one gets its ``end``.
         """
@@ -141,7 +141,7 @@ class GrowingEvidence:
             witness.examine(self.find_wait, self._find_gravity)
             last_time = float(witness.time[-1])
             candidates += [(flight, last_time) for flight in witness.flights]
-        # If parts and the model show a flight at the same state, that of the parts comes first.
+        # If the parts and the model show a flight at the same state, the flight of the parts comes first.
         candidates.sort(key=lambda pair: pair[0].seen)
         chosen: list[Quiet] = []
         for flight, last_time in candidates:
@@ -149,7 +149,7 @@ class GrowingEvidence:
             if last_end is None or flight.seen <= last_end:
                 continue
             if flight.end is None:
-                # The evidence of the parts may end in the flight, as when they become rigid.
+                # The evidence of the parts may end during the flight, for example when the parts become rigid.
                 ends = (
                     longer.end
                     for longer, _ in candidates
@@ -175,7 +175,7 @@ class GrowingEvidence:
         return None if self.motion.is_unfinished(now) else longest
 
     def _stores_no_energy(self, start: float, now: float) -> bool:
-        """Return True if the internal energy is round-off in a span, compared with the kinetic energy if written."""
+        """Return True if the internal energy in a span is round-off compared with the kinetic energy, if written."""
         history = self.history
         internal = np.abs(history.between(start, now)[1]).max()
         balance, kinetic = history.balance, 0.0
@@ -187,7 +187,7 @@ class GrowingEvidence:
     def _find_gravity(
         self, witness: GrowingWitness, first: int, last: int
     ) -> float | None:
-        """Return the gravity between two states as `Laws.gravity` returns it; None if a support holds parts.
+        """Return the gravity between two states, as `Laws.gravity` does; None if a support holds parts.
 
         Only states up to the last one are used, and of a long record only some.
         """
@@ -203,12 +203,12 @@ class GrowingEvidence:
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
         if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # For a constant momentum, a fit would treat rounding errors as gravity.
+            return 0.0  # A fit to a constant momentum would find false gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:
-        """Return the start of the force-free time that lasts up to a time; if there are no states, return that time."""
+        """Return the start of the force-free time that lasts until a given time; without states, return that time."""
         starts = [time]
         for witness in self.witnesses:
             state = int(np.searchsorted(witness.time, time, side="right")) - 1
@@ -217,7 +217,7 @@ class GrowingEvidence:
         return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Return all force-free times that ended after ``since`` without being detected as flights [time]."""
+        """Return all force-free times that ended after ``since`` but were not detected as flights [time]."""
         for witness in self.witnesses:
             if self._going_on.get(witness.parts) is witness:
                 return tuple(pause for pause in witness.pauses if pause[1] > since)
@@ -249,7 +249,7 @@ class GrowingEvidence:
 
 
 def _sample_states(first: int, last: int) -> Samples:
-    """Return the states from ``first`` to ``last``; if there are too many, a uniform selection of them."""
+    """Return the states from ``first`` to ``last``, or a uniform selection of them if there are too many."""
     return np.linspace(first, last, min(last - first + 1, _GRAVITY_STATES)).round()
 
 
@@ -272,7 +272,7 @@ def _make_columns(
 
 
 def _list_sets(momenta: Momenta) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of parts that may fly together: the chosen parts with all connected parts, and all parts.
+    """Return the sets of parts that may fly together: the chosen parts plus all connected parts, and all parts.
 
     Parts are given by their numbers in the momenta.
     """

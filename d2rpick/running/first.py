@@ -1,4 +1,4 @@
-"""Print the cards of a first run that switches its parts by itself: the solver detects flights by contact forces.
+"""Print the cards of a first run that switches its parts by contact forces, from which the solver detects flights.
 
 Radioss: legs that sensors end by /STOP/LSENSOR (tried with a solver; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.reader import Deck
 
-# Number of engine files from which the OpenRadioss starter reads /RBODY/OFF.
+# Number of engine files in which the OpenRadioss starter reads /RBODY/OFF.
 _MOST_LEGS: Final = 9
-# Ratio of the force-free time that shows a flight to the largest time step while the parts are rigid [-].
+# Ratio of the force-free time that shows a flight to the largest time step while parts are rigid [-].
 # With this time-step limit, a contact is detected at most one time step late.
 _STEPS_PER_WAIT: Final = 300
 # Ratio of the required force-free time to the time after a switch in which LS-DYNA ignores contacts [-].
 _DELAYS_PER_WAIT: Final = 100
-# Radioss keywords of loads that are no contact forces.
+# Radioss keywords of loads that are not contact forces.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _UNSEEN: Final = "acts without a contact, so contacts do not show the flight"
 _OF_ALL: Final = (
@@ -71,11 +71,11 @@ _WITHOUT_OFFSET: Final = (
     "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells"
     " have a margin."
 )
-# _PUSHES: prefixes of the LS-DYNA keywords of loads that are no contact forces.
+# _PUSHES: prefixes of the LS-DYNA keywords for loads that are not contact forces.
 # _OF_GRAVITY: prefixes of the LS-DYNA keywords that define gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# Gap in LS-DYNA at which the parts become deformable before a contact, as a multiple of the largest shell thickness.
-# The gap must exceed the contact thickness, which is half of the thickness of each of the two shells.
+# LS-DYNA makes the parts deformable before a contact if the gap is this multiple of the largest shell thickness [-].
+# The gap must exceed the contact thickness, which is half the thickness of each of the two shells.
 _OFFSET_THICKNESSES: Final = 2
 
 
@@ -85,7 +85,7 @@ def first_card(
     wait: float | None = None,
     after: float | None = None,
 ) -> tuple[PrintedCard, Wait]:
-    """Print the cards with which the first run of a deck switches its parts by itself.
+    """Print the cards with which the first run of a deck switches its parts by contact forces.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def first_card(
 
 
 def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Return the given waiting time, or half of the deck's longest period; raise ArgumentError if both are unknown."""
+    """Return the given waiting time, or half of the deck's longest period; raise ArgumentError if neither is known."""
     of_deck = wait_of_deck(inventory)
     if given is not None:
         check_wait(given, of_deck, path)
@@ -152,7 +152,7 @@ def _make_radioss_card(
     wait: Wait,
     after: float | None,
 ) -> PrintedCard:
-    """Print the engine files and sensors of a Radioss run; raise DeckError if contact forces cannot show a flight."""
+    """Print the engine files and sensors of a Radioss run; raise DeckError unless contact forces reveal a flight."""
     run, bodies = read_run(path), find_bodies(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
@@ -208,7 +208,7 @@ def _make_ls_dyna_card(
     wait: Wait,
     after: float | None,
 ) -> PrintedCard:
-    """Print the switch sets of an LS-DYNA run; raise DeckError if the force of one contact cannot show a flight."""
+    """Print the switch sets of an LS-DYNA run; raise DeckError unless the force of one contact reveals a flight."""
     deck = read_deck(path)
     contact, keyword = _find_contact(path, deck)
     part_ids = check_ids(parts)
@@ -237,7 +237,7 @@ def _make_ls_dyna_card(
 
 
 def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
-    """Return id and keyword of the contact for which a switch can wait; raise DeckError if there is no such contact."""
+    """Return the id and keyword of the contact on which a switch can wait; raise DeckError if there is none."""
     for card in deck.cards:
         if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
             raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
@@ -253,7 +253,7 @@ def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
 
 
 def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
-    """Return the gap between the surfaces at which the parts become deformable again [length], with a note."""
+    """Return the gap between the surfaces at which the parts are made deformable again [length], with a note."""
     thicknesses = [part.section.thickness for part in inventory.parts.values()]
     thickest = max((thickness or 0.0 for thickness in thicknesses), default=0.0)
     if not keyword.startswith("CONTACT_AUTOMATIC_") or thickest <= 0:

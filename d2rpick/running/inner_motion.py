@@ -1,4 +1,4 @@
-"""Determine the waiting time (the force-free time that shows a flight) from the internal oscillations of the body.
+"""Determine the waiting time (the force-free time that shows a flight) from the oscillations inside the body.
 
 The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
 and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
@@ -25,30 +25,30 @@ if TYPE_CHECKING:
     # Slices of the latest states, each with the columns of the parts that move in it.
     MovingParts = Sequence[tuple[slice, Sequence[int]]]
 
-# Smallest velocity change that is an oscillation, as a fraction of the velocity range so far [-].
+# Smallest velocity change that counts as an oscillation, relative to the velocity range so far [-].
 _SWING: Final = 1 / 3
-# _INNER: fraction of the change in a half period that is omitted at each end to measure the half period [-].
-# _INNER_TIME: fraction of half its period that a harmonic motion takes for the middle part of the change [-].
+# _INNER: fraction of the velocity change ignored at each end when a half period is measured [-].
+# _INNER_TIME: fraction of the half period in which a harmonic motion makes the middle part of that change [-].
 _INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# Largest mean force of an oscillation treated as body rotation, as a fraction of the largest mean force so far [-].
+# Largest mean force in an oscillation treated as body rotation, relative to the largest mean force so far [-].
 _ROTATION: Final = 0.05
 # Smallest number of states in an oscillation; a change within fewer states is treated as a jump.
 _FEWEST_STATES: Final = 4
-# Smallest relative velocity of a part that oscillates, as a fraction of the velocity of all parts [-].
+# Smallest relative velocity of an oscillating part, as a fraction of the velocity of all parts [-].
 _AT_REST: Final = 1e-3
-# Ratio to the longest earlier half period above which the end of an oscillation is unknown [-].
+# An unfinished oscillation longer than this may last arbitrarily long, relative to the longest half period so far [-].
 _MUCH_LONGER: Final = 2.0
-# _LONGEST_FREE: largest duration of a free oscillation that is no body rotation, in half periods of the deck [-].
-# _LONGEST_PUSHED: largest duration of an oscillation under load that is no body rotation, in half periods [-].
+# _LONGEST_FREE: a longer free oscillation is attributed to body rotation, in half periods of the deck [-].
+# _LONGEST_PUSHED: upper limit for the half period of an oscillation under load, in half periods of the deck [-].
 _LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
-# Smallest waiting time that the user may give, as a fraction of half the longest period [-], uncertain by 10 %.
+# Smallest waiting time that the user may give, relative to half the longest period [-], which is uncertain by 10 %.
 _EXACT: Final = 0.9
-# Smallest mass fraction of parts that are considered [-], because lighter parts hardly move the other parts.
+# Smallest mass fraction of the parts considered [-]; lighter parts hardly move the other parts.
 _HEAVY: Final = 0.05
 
 
 class Wait(NamedTuple):
-    """Force-free time that shows a flight [time], with its source and reason.
+    """Force-free time that shows a flight [time], with its source and the reason for it.
 
     ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
     [time]; None if that is the wait itself.
@@ -75,7 +75,7 @@ class _HalfPeriod(NamedTuple):
 
 
 class _Motion:
-    """One oscillating quantity, such as a velocity component of a part: its states and half periods so far.
+    """One oscillating quantity, such as a velocity component of a part, with its states and half periods so far.
 
     Half a period takes ``halves_per_swing`` swings of its values: 1 for a velocity, 2 for an energy.
     """
@@ -86,10 +86,10 @@ class _Motion:
         self.has_free_swing = False
         # The first half period has no duration; it ends when the motion is first detected.
         self._swings: list[_HalfPeriod] = []
-        # The columns contain time, value, and the smallest change that is an oscillation.
+        # The columns contain the time, the value, and the smallest change that counts as an oscillation.
         self._columns = GrowingColumn()
         self._highest, self._lowest = RunningMaximum(), RunningMaximum()
-        # State at the last extremum, state at the extreme value since then, and direction (1 rising, -1 falling).
+        # State at the last extremum, most extreme state since then, and direction (1 rising, -1 falling).
         self._turn, self._extreme, self._sign = 0, 0, 1
 
     def add(
@@ -126,7 +126,7 @@ class _Motion:
         self._swings.append(_HalfPeriod(self, now, now, now))
 
     def _measure(self, rows: Samples, now: float) -> _HalfPeriod:
-        """Measure the half period from the last extremum to the extreme value, as detected ``now``."""
+        """Measure the half period from the last extremum to the current extreme value, which is detected at ``now``."""
         time, distance = rows[:, 0], np.abs(rows[:, 1] - rows[0, 1])
         low = int(np.flatnonzero(distance <= _INNER * distance[-1])[-1])
         high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * distance[-1]))
@@ -160,7 +160,7 @@ class _Motion:
 
 
 class _Longest(NamedTuple):
-    """The longest half period of the internal motion so far, as the ``wait`` for which it asks; None if there is none.
+    """The longest half period of the internal motion so far, and the waiting time ``wait`` that it requires, if any.
 
     ``since`` is the time of detection [time], ``strength`` the largest mean rate of change so far. ``swing`` is half of
     the longest swing, even if a force pushed the swing [time].
@@ -185,13 +185,13 @@ class InnerMotion:
         if before > time_of_deck:
             self._least = Wait(before, "record", "as in the flight before")
         self._energy = _Motion("the internal energy", halves_per_swing=2.0)
-        # Motions of parts, keyed by the number of times without motion before and the indices of part and axis.
+        # Motions of parts, keyed by the number of earlier times without motion, the part index and the axis index.
         self._part_motions: dict[tuple[int, int, int], _Motion] = {}
         self._rest_count = 0
         self._largest_speed, self._largest_energy = RunningMaximum(), RunningMaximum()
-        # Time from which the motions of the parts are used instead of the energy [time].
+        # Time from which on the motions of the parts are used instead of the energy [time].
         self._parts_since = np.inf
-        # Longest half period of any part so far, with one entry for each time at which it grew.
+        # Longest half period of any part so far, with one entry for each time at which it increased.
         self._longest_of_parts = [_Longest(-np.inf)]
         self._longest_of_energy = [_Longest(-np.inf)]
 
@@ -201,7 +201,7 @@ class InnerMotion:
         moving_parts: MovingParts,
         free_since: Callable[[float], float],
     ) -> None:
-        """Append states. ``free_since`` returns when the force-free time that lasts up to a time began [time]."""
+        """Append states. ``free_since`` returns when the force-free time that lasts until a given time began [time]."""
         momenta = states.find_momenta(of_parts=True)
         if momenta is not None and momenta.masses is not None:
             swings = self._follow_parts(momenta, momenta.masses, moving_parts)
@@ -242,7 +242,7 @@ class InnerMotion:
         so_far: list[_Longest],
         free_since: Callable[[float], float],
     ) -> None:
-        """Lengthen the waiting time by completed half periods that were neither a rotation nor pushed.
+        """Lengthen the waiting time to suit half periods that were neither rotations nor caused by a push.
 
         A pushed swing counts if there is no deck and this motion has not yet had an unforced oscillation.
         """
@@ -276,13 +276,13 @@ class InnerMotion:
         return max(self._get_longest(now).swing, self._least_time)
 
     def _get_longest(self, now: float) -> _Longest:
-        """Return the longest half period known at a time: from the parts, or from the energy while no part moves."""
+        """Return the longest half period known at a time, from the parts or, while no part moves, from the energy."""
         has_parts = self._parts_since <= now
         so_far = self._longest_of_parts if has_parts else self._longest_of_energy
         return so_far[bisect_right(so_far, now, key=lambda longest: longest.since) - 1]
 
     def is_unfinished(self, now: float) -> bool:
-        """Return True if an oscillation still lasts, is much longer than all earlier ones, and there is no deck."""
+        """Return True if an oscillation still lasts and is much longer than all earlier ones, and there is no deck."""
         if self._least is not None:
             return False
         least_strength = _ROTATION * self._get_longest(now).strength
@@ -295,7 +295,7 @@ class InnerMotion:
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
-    """Return half of the longest period of a deck's springs; None if the deck does not define it."""
+    """Return half of the longest period of the springs in a deck; None if the deck does not determine it."""
     period = find_inner_period(inventory)
     if period is None:
         return None

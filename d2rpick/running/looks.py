@@ -1,4 +1,4 @@
-"""Read the files of a run repeatedly while it is computed, and return the new states.
+"""Read the files of a run repeatedly while the run is being computed, and return the new states.
 
 Only the last states of a solver's histories are read again.  Files of other formats are read completely each time.
 """
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.resuming import ResumePoint
 
-# Number of states below which a record is read completely each time, because early results may still change.
+# Up to this number of states, a record is read completely each time, because early results may still change.
 _FEWEST_STATES: Final = 200
 
 
 class Looks:
-    """Reads the same run repeatedly, with the same ``selection`` and deck, and keeps the ``evidence`` of its flights.
+    """Reads the same run repeatedly with the same ``selection`` and deck, and keeps the ``evidence`` of its flights.
 
     ``wait`` is the waiting time that the user gave [time].
     """
@@ -45,7 +45,7 @@ class Looks:
         self._waits = (wait, wait_of_deck(inventory) if inventory else None)
         self.evidence = GrowingEvidence(*self._waits)
         self.record = GrowingRecord()
-        # Place in each file where the next read continues; empty if the next read covers all states.
+        # Position in each file at which the next read continues; empty if the next read covers all states.
         self.resume_points: dict[str, ResumePoint] = {}
         # All files of the last read.
         self._names: frozenset[str] = frozenset()
@@ -63,7 +63,7 @@ class Looks:
         return bool(states.time.size)
 
     def new_states(self, names: Sequence[str]) -> tuple[History, bool]:
-        """Read the new states, and return them with True if they follow the states read before.
+        """Return the new states, and True if they continue the states read before.
 
         If they do not, since files were written anew, all states are given.
 
@@ -75,7 +75,7 @@ class Looks:
             If a file is no longer there.
         """
         if not self._names <= {*names}:
-            # A file no longer exists, so all files are read from their start.
+            # If a file no longer exists, all files are read from their start.
             self.resume_points, self.record = {}, GrowingRecord()
         follows = self.record.history is not None
         states = self._read_on(names)
@@ -86,12 +86,12 @@ class Looks:
             if new_states is None:
                 self.record, follows = GrowingRecord(), False
                 new_states = self.record.extend(whole)
-                assert new_states is not None  # An empty record takes all states.
+                assert new_states is not None  # An empty record accepts all states.
         self._names = frozenset(names)
         return new_states, follows
 
     def _read_whole(self, names: Sequence[str]) -> History:
-        """Read all states of the files, with the errors of `new_states`."""
+        """Read all states of the files; the errors are those of `new_states`."""
         sources = open_files(names)
         history, points = self._open(sources)
         is_packed = any(source.packed is not None for source in sources)
@@ -100,7 +100,7 @@ class Looks:
         return history
 
     def _read_on(self, names: Sequence[str]) -> History | None:
-        """Read the last states of each file, including known states, and read new files completely.
+        """Read the last states of each file, which include known states, and read new files completely.
 
         Files without a resume point, such as files with forces only, are not read again.  Return None if a file cannot
         be read from its resume point, as when it was written anew.
@@ -126,9 +126,9 @@ class Looks:
     def _open(
         self, sources: Sequence[Source]
     ) -> tuple[History, dict[str, ResumePoint]]:
-        """Return the history in the files, without an incomplete last state, and where to continue in each file.
+        """Return the history in the files, without an incomplete last state, and where to resume reading each file.
 
-        The places are {} if the format of a file is always read as a whole.
+        The positions are {} if the format of a file is always read as a whole.
         """
         run = open_sources(sources, self._selection)
         points = join_resume_points(

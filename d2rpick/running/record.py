@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     Table = History | Momenta | Balance
 
-# Smallest time difference of two different states, in units of the last printed digit [-].
+# Smallest time difference between two states, in units of the last printed digit [-].
 _APART: Final = 1.5
-# Tolerance for a value that is read twice, as a fraction of the largest value [-]; sums over parts may be rounded.
+# Tolerance for a value that is read twice, relative to the largest value [-]; sums over parts may be rounded.
 _SAME: Final = 1e-9
 
 
 class GrowingColumn:
-    """An array to which ``rows`` are appended; it is copied only when its capacity is doubled."""
+    """An array to which ``rows`` can be appended; the array is copied only when its capacity is doubled."""
 
     def __init__(self) -> None:
         self.rows: NDArray[Any] = np.empty(0)
@@ -50,7 +50,7 @@ class GrowingColumn:
 
 
 class RunningMaximum:
-    """The largest of all values so far, used for limits at a state that must not depend on later states."""
+    """The largest of all values so far; limits based on it at a state do not depend on later states."""
 
     def __init__(self) -> None:
         self._last: NDArray[Any] | None = None
@@ -67,12 +67,12 @@ class GrowingRecord:
     """All states of a run so far, as columns of three kinds of tables: history, momenta and balance."""
 
     def __init__(self) -> None:
-        # Columns, keyed by the number of their table and by their name.
+        # Columns, keyed by table number and column name.
         self._columns: dict[tuple[int, str], GrowingColumn] = {}
         self.history: History | None = None
 
     def extend(self, states: History) -> History | None:
-        """Append the states after the known ones, and return them; None if the last known states are not among them."""
+        """Append those ``states`` that follow the last known state, and return them; None if that state is missing."""
         tables = _list_tables(states)
         known_tables: list[Any] = [None] * len(tables)
         if self.history:
@@ -130,7 +130,7 @@ def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
             return None
     selected = select_states(table, slice(count, new_states.stop))
     if isinstance(selected, Momenta) and isinstance(known_table, Momenta):
-        # A mass that is not written is a lower bound from the states that were read.
+        # A mass that is not written is a lower bound determined from the states that were read.
         masses = [selected.masses, known_table.masses]
         known_masses = [values for values in masses if values is not None]
         if known_masses:
@@ -139,7 +139,7 @@ def _select_new_states(table: Table, known_table: Table | None) -> Table | None:
 
 
 def _is_unsettled(table: Table) -> bool:
-    """Return True if the last two times of a table are as close as printed times can be."""
+    """Return True if the last two times of a table are as close together as printed times can be."""
     precision = (
         table.precision if not isinstance(table, History) else table.time_precision
     )

@@ -1,4 +1,4 @@
-"""Choose the next engine run (leg) of a first run that switches its parts by itself, from the results so far.
+"""Choose the next engine run (leg) of a first run that chooses its own switching times, from the results so far.
 
 The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
 machine is.  A leg that replaces a discarded one gets its number.
@@ -16,33 +16,33 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Each engine run (leg) of a first run is of one of three kinds.
+# Each engine run (leg) of a first run is one of three kinds.
 # LOAD: the parts are deformable.
-# PROBE: the parts are rigid, and the engine run continues until it shows the contact that ends the flight.
+# PROBE: the parts are rigid, and the engine run goes on until it shows the contact that ends the flight.
 # RIGID: the parts are rigid, and the engine run ends at td, which a probe has determined.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
-# Largest difference of times that are treated as equal [output intervals].
+# Largest difference between times that are treated as equal [output intervals].
 # A history may end one output interval early.
 _STATES: Final = 1.5
-# Number of remaining engine-run numbers at which no further flight is switched, so that the run can reach its end.
+# If only this many engine-run numbers remain, no further flight is switched, so that the run can reach its end.
 _KEPT_BACK: Final = 10
-# Shortest deformable engine run in a flight, as a fraction of the force-free time that shows a flight [-].
+# Shortest deformable engine run in a flight, relative to the force-free time that shows a flight [-].
 _LEAST: Final = 0.25
-# Length of a deformable engine run while the period of the vibration is unknown, as a fraction of the run [-].
+# Length of a deformable engine run while the vibration period is unknown, as a fraction of the run [-].
 _UNKNOWN: Final = 0.02
-# A longer probe computes more after the contact, whereas a shorter probe needs more restarts.
+# A longer probe computes more after the contact, whereas shorter probes need more restarts.
 # _OF_FLOWN: smallest length of a probe as a fraction of its rigid time so far [-].
 # _OF_RUN: smallest length of a probe as a fraction of the run [-].
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
-# Assumed cost of writing and reading a restart file, in deformable cycles; about 5 were measured.
+# Assumed cost of writing and reading a restart file [deformable cycles]; about 5 cycles were measured.
 _RESTART: Final = 10
-# Shortest flight that is switched, in half periods of its slowest vibration [-].
-# In shorter flights, freezing the vibration shifts the landing too much.
+# Shortest flight that is switched, in half periods of the slowest vibration [-].
+# In shorter flights, the frozen vibration shifts the landing too much.
 # After flights of 2.4 and 2.8 half periods, two soft boxes landed 33 ms and 55 ms late.
 # After flights of at least 3.2 half periods, cars and boxes landed within 3.4 ms of the right time.
 _SWINGS: Final = 3.0
-# Smallest saving of a window, as a fraction of the cost of a deformable run [-].
-# Smaller savings are not worth the shift of later landings, which was up to 37 ms in two computed boxes.
+# Smallest worthwhile saving of a window, relative to the cost of a deformable run [-].
+# Smaller savings do not justify the shift of later landings, which reached 37 ms in two computed boxes.
 _WORTH: Final = 0.04
 
 
@@ -73,11 +73,11 @@ class Limits(NamedTuple):
 
     @property
     def same(self) -> float:
-        """Difference below which two times are treated as equal [time]."""
+        """Times that differ by less than this are treated as equal [time]."""
         return _STATES * self.interval
 
     def until_end(self, until: float) -> float:
-        """Return ``until``, or the end of the run if ``until`` is close to that [time]."""
+        """Return ``until``, or the end of the run if ``until`` is close to it [time]."""
         return until if until < self.end - self.same else self.end
 
 
@@ -99,11 +99,11 @@ class Order(NamedTuple):
         return self.kind != LOAD
 
     def undone(self) -> Order:
-        """Return the order at the end of the engine run before this one, as if this one had not been computed."""
+        """Return the order at the end of the previous engine run, as if this engine run had not been computed."""
         return self._replace(number=self.number - 1, until=self.start)
 
     def following(self, kind: str, until: float) -> Order:
-        """Return the request for an engine run that begins at the end of this one."""
+        """Return the request for an engine run that begins where this one ends."""
         return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
 
@@ -150,7 +150,7 @@ class LegFindings(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A computed engine run, with its ``cycles`` and CPU time ``cpu`` [s], which are None if its listing lacks them."""
+    """A completed engine run, with its number of ``cycles`` and CPU time ``cpu`` [s]; both None without a listing."""
 
     order: Order
     findings: LegFindings
@@ -164,7 +164,7 @@ class Leg(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A flight that was switched at ``tr`` and ``td``, or left deformable for a ``reason``.
+    """A flight that was switched at ``tr`` and ``td``, or that was left deformable for the given ``reason``.
 
     ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
     ``warning`` is about a part that moves so much that the body may be out of place at td; otherwise "".
@@ -187,7 +187,7 @@ def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
     D2RPickError
         If the solver has no number for one more leg.
     """
-    if not legs:  # The first engine run can show whether parts at rest fall.
+    if not legs:  # The first engine run can show whether parts fall from rest.
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last, findings = legs[-1].order, legs[-1].findings
     if findings.contact is not None:
@@ -216,7 +216,7 @@ def _starts_window(last: Order, findings: LegFindings, limits: Limits) -> bool:
 
 
 def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
-    """Schedule a deformable engine run that ends once a current or past flight has lasted for the required time.
+    """Schedule a deformable engine run that ends when a current or past flight has lasted for the required time.
 
     The flight in which a window ends is not switched again.
     """
@@ -235,7 +235,7 @@ def _order_load(last: Order, findings: LegFindings, limits: Limits) -> Order:
 
 
 def _order_probe(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Schedule the next part of a probe, which begins after the last engine run or has begun earlier."""
+    """Schedule the next part of a probe that begins after the last engine run or has already begun."""
     last, findings = legs[-1].order, get_flight_findings(legs)
     flown = 0.0
     if last.rigid:
@@ -269,7 +269,7 @@ def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
 
 
 def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Return the window before the contact that the last engine run showed, or else up to the end of the run."""
+    """Return the window before the contact that the last engine run showed; without contact, up to the end."""
     rigid_orders = collect_joined_legs(legs[-1].order, legs)
     findings, contact = get_flight_findings(legs), legs[-1].findings.contact
     window = Window(
@@ -285,7 +285,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
     td = contact - limits.margin_of(flight, idle=findings.idle)
     for order in rigid_orders:
         if 0 <= td - order.until <= limits.same:
-            td = order.until  # An engine run must have at least two states.
+            td = order.until  # An engine run must contain at least two states.
     reason = _explain_too_little_saved(legs, window.tr, td, limits)
     if not findings.idle and flight < _SWINGS * findings.swing:
         reason = f"shorter than {_SWINGS:g} half cycles of {findings.swing:.3g}: its landing is unknown"
@@ -298,7 +298,7 @@ def find_next_window(legs: Sequence[Leg], limits: Limits) -> Window:
 def _explain_too_little_saved(
     legs: Sequence[Leg], tr: float, td: float, limits: Limits
 ) -> str | None:
-    """Explain why a window saves less than its probe and restarts cost; None if it saves more.
+    """Explain why a window saves less than its probe and its restarts cost; None if it saves more.
 
     The comparison uses cycles, because CPU times vary and the same command must compute the same run.
     """
@@ -307,7 +307,7 @@ def _explain_too_little_saved(
     deformable_legs = [leg for leg in legs if not leg.order.rigid and leg.cycles]
     length = sum(leg.length for leg in deformable_legs)
     cycles = sum(leg.cycles or 0 for leg in deformable_legs)
-    cost = 0.0  # The cost is counted in deformable cycles.
+    cost = 0.0  # The cost is measured in deformable cycles.
     for leg in legs:
         if leg.order.rigid and leg.order.start >= tr:
             cost += (leg.cycles or 0) * limits.rigid_cycle + _RESTART
@@ -318,7 +318,7 @@ def _explain_too_little_saved(
 
 
 def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Return the engine runs since the parts last became rigid or deformable, up to and including a given one."""
+    """Return the engine runs since parts last became rigid or deformable, up to and including the given one."""
     latest = {leg.order.number: leg.order for leg in legs}
     joined = [order]
     while (previous := latest.get(joined[0].number - 1)) and (
@@ -329,12 +329,12 @@ def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
 
 
 def get_flight_findings(legs: Sequence[Leg]) -> LegFindings:
-    """Return the findings about the flight at the end of the last deformable engine run, when it was switched."""
+    """Return the findings at the end of the last deformable engine run about the flight that was then switched."""
     return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Return all flights so far, switched or left out, in the order of their starts."""
+    """Return all flights so far, switched or left deformable, in the order of their starts."""
     by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
         for start, end in leg.findings.short:

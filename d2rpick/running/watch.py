@@ -1,4 +1,4 @@
-"""Watch a run while it is computed, and report each event once.
+"""Watch a run while it is being computed, and report each event once.
 
 Nothing is started, stopped or changed.  The pause after each read is 100 times as long as the read, so that watching
 takes 1 % of a processor core.
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Selection
 
-    # Number of a file, its size, and the time at which it was written [s].
+    # Inode number of a file, its size, and the time at which it was written [s].
     FileStamp = tuple[int, int, float]
 
-# Largest fraction of the time of a processor core that reading may take [-].
+# Largest fraction of a processor core's time that reading may take [-].
 _SHARE: Final = 0.01
 # _SHORTEST: shortest pause between two reads [s].
 # _LONGEST: longest pause between two reads that cover only new states [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
-# Time without output after which a run is reported as silent [s].
+# A run is reported as silent after this time without output [s].
 _SILENT: Final = 60.0
 _PACKED: Final = "normally: its history is packed"
 _NO_EVIDENCE: Final = (
@@ -57,14 +57,14 @@ class Watch:
         self._names = names
         self.looks = Looks(selection, inventory, wait)
         self._files: dict[str, FileStamp] = {}
-        self._events: tuple[Event, ...] = ()  # Events that were reported so far.
+        self._events: tuple[Event, ...] = ()  # Events that have been reported.
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
         self.ended: str | None = None
 
     def news(self) -> Iterator[Event]:
-        """Return the events since the last read; empty for a run that has not begun.
+        """Return the events since the last read; empty for a run that has not yet begun.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Watch:
                 yield from self._read([*files])
                 self._error = None
             except (FormatError, HistoryError) as error:
-                # The error is not raised, because the solver may be writing the file at this moment.
+                # The error is not raised, because the solver may be writing to the file at this moment.
                 self._error = error
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
@@ -93,7 +93,7 @@ class Watch:
             yield self._make_event("silent", f"nothing was written for {silence:.0f} s")
 
     def state(self) -> Event:
-        """Return a sentence that states whether the parts fly now, and since when."""
+        """Return a sentence that states whether the parts are flying now, and since when."""
         if self._last_time is None:
             message = f"{list_names(self._names)}: no file of a run yet; check the name if the run has begun"
             if self._error:
@@ -114,7 +114,7 @@ class Watch:
         return Event("state", time, now, message)
 
     def _read(self, names: Sequence[str]) -> Iterator[Event]:
-        """Read the new states and return their events."""
+        """Read the new states, and return the events that they show."""
         if not names or not self.looks.look(names):
             return
         evidence = self.looks.evidence
@@ -160,7 +160,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[Event]:  # fmt: skip
-    """Yield the events of a run until it has ended, or for ``lasting`` [s]; `Watch` describes the other arguments."""
+    """Yield the events of a run until it has ended, or for ``lasting`` [s]; see `Watch` for the other arguments."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
@@ -168,7 +168,7 @@ def follow(
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
         if watch.looks.resume_points:
-            # Only the first read covers all states, so later pauses are short.
+            # Only the first read covers all states, so the pauses after later reads are short.
             pause = min(pause, _LONGEST)
         remaining = end - time.monotonic()
         if remaining <= 0 or (watch.ended and lasting is None):
@@ -178,7 +178,7 @@ def follow(
 
 
 def find_files(names: Sequence[str]) -> dict[str, FileStamp]:
-    """Return the non-empty files of a run, including those of later engine runs in the folder, with stamps."""
+    """Return the non-empty files of a run with their stamps, including files of later engine runs in the folder."""
     try:
         paths = expand(names)
     except FormatError as error:

@@ -1,4 +1,4 @@
-"""Find the force-free time of given parts, or of the model, at each state of a record, from the states so far.
+"""Find the force-free time of the given parts, or of the model, at each state of a record from the states so far.
 
 In this time the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no momentum
 is written, the contact energy is constant instead.  A flight is seen once this has lasted for the wait, since a force
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.running.inner_motion import Wait
 
-# Largest change of a constant momentum or contact energy, as a fraction of its largest value so far [-].
-# CONSTANT is 10 times the error of sums in single precision.
+# Largest change of a momentum or contact energy that counts as constant, relative to its largest value so far [-].
+# CONSTANT is 10 times the error of single-precision sums.
 CONSTANT: Final = 1e-4
-# Time from one test for a force to the next, as a fraction of the force-free time so far [-].
+# Time between two tests for a force, as a fraction of the force-free time so far [-].
 _TEST_AGAIN: Final = 0.25
-# Number of states of a long window that are compared with the law; few suffice, as a force has a lasting effect.
+# Number of states of a long window that are compared with the law; few suffice, because a force has a lasting effect.
 _MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """A flight, which is a period without force that lasted for the required time.
+    """A flight, i.e. a period without force that lasted for the required time.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class _SampledFall(FreeFall):
 
 
 class GrowingWitness:
-    """Finds at each of its states the force-free time of given parts, or of the whole model.
+    """Finds the force-free time of the given parts, or of the whole model, at each state.
 
     Attributes
     ----------
@@ -108,9 +108,9 @@ class GrowingWitness:
         self._columns = GrowingColumn()
         self.time: Samples = self._columns.rows
         self._laws: list[tuple[Law, Samples]] = []
-        # True for each state at which the printed digits are precise enough to show a force.
+        # True for each state whose printed digits are precise enough to show a force.
         self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
-        # Start of the force-free time that lasts at the last examined state [time].
+        # Start of the force-free time that has lasted until the last examined state [time].
         self._start = 0.0
         self._examined_count = self._test_again_at = 0
 
@@ -145,14 +145,14 @@ class GrowingWitness:
             self.free.append(first)
 
     def misfit(self, first: int, last: int) -> float:
-        """Return the unexplained change between two states over its tolerance [-]; a force acts if it exceeds 1."""
+        """Return the ratio of the unexplained change between two states to its tolerance [-]; above 1, a force acts."""
         return max(
             law.misfit(first, last) / float(tolerance[last])
             for law, tolerance in self._laws
         )
 
     def _find_first_without_force(self, earliest: int, last: int) -> int:
-        """Return the first state, at or after ``earliest``, after which no force acts until the state ``last``."""
+        """Return the first state, not before ``earliest``, from which no force acts until the state ``last``."""
         if self.misfit(earliest, last) <= 1:
             return earliest
         return find_farthest(
@@ -164,7 +164,7 @@ class GrowingWitness:
         find_wait: Callable[[float, float], Wait | None],
         find_gravity: Callable[[GrowingWitness, int, int], float | None],
     ) -> None:
-        """Update the lists of flights and of ended force-free times with the new states.
+        """Add the flights and the ended force-free times that the new states show.
 
         ``find_wait`` returns the waiting time for a flight since a time from the states up to a later one, or None;
         ``find_gravity`` the gravity between two states, None if another force acts or a support holds parts.
@@ -194,7 +194,7 @@ class GrowingWitness:
         self._examined_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: Wait, gravity: float | None) -> None:
-        """Record a flight since ``first`` that is detected now; without ``gravity``, only schedule a new test."""
+        """Record a flight since ``first`` that is detected now; if ``gravity`` is unknown, only schedule a new test."""
         if gravity is None:
             self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return
@@ -213,7 +213,7 @@ class GrowingWitness:
         )
 
     def _find_level(self, first: int, last: int) -> float | None:
-        """Return when the centre of mass is again as high as at ``first`` [time]; None if that is before ``last``."""
+        """Return when the centre of mass is as high again as at ``first`` [time]; None if that is before ``last``."""
         begin, end = self._columns.rows[[first, last]]
         gained = end[2:] - begin[2:]
         time_to_level = (
@@ -226,7 +226,7 @@ class GrowingWitness:
 def _set_tolerance(
     values: Samples, precision: Precision, count: int = 1
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """Return the tolerance at each state of a sum of ``count`` values, and whether it is small enough to show forces.
+    """Return the tolerance of a sum of ``count`` values at each state, and whether it is small enough to show forces.
 
     ``values`` (n,) are those of the sum.
     """

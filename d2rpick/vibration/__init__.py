@@ -56,7 +56,7 @@ class VibratingTogether(Protocol):
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Return times and kinetic vibration energies (n,) in the flight [time], [energy]; None if unknown."""
+        """Return times [time] and kinetic vibration energies [energy] in the flight, shape (n,); None if unknown."""
 
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 def find_models(
     history: History, flight: Span, settled: Span, *, together: VibratingTogether
 ) -> dict[str, SignedModel]:
-    """Search for models of the energy in a ``flight``, best first, until one gives the sign of the deformation.
+    """Search a ``flight`` for models of the energy, best model first, until one gives the sign of the deformation.
 
     Swings are counted in the flight from when the energy has ``settled``, which may be before it.
     """
@@ -77,7 +77,7 @@ def find_models(
     modal = _find_modal(history, *ends, together=together) if ends else None
     if modal is not None:
         models["modal"] = modal
-        # If the modes are very uncertain, counting half cycles of the energy may be more accurate.
+        # If the modes are very uncertain, counted half cycles of the energy may be more accurate.
         if modal.signed and not modal.is_vague:
             return _rely_on_vague(models)
     ends = get_ends(history.between(*settled)[0])

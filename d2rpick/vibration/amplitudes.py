@@ -22,7 +22,7 @@ class SignedAmplitudes:
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the sum of q(tr) q(td), with the shape of ``tr`` [energy]; ``td`` is a number, or one for each tr."""
+        """Return the sum of q(tr) q(td), with the shape of ``tr`` [energy]; ``td`` is a number or an array."""
         return np.asarray(
             np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr))
         )

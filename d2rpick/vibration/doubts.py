@@ -1,4 +1,4 @@
-"""Measure what speaks against the record of a linear structure in free flight, and say why a record is refused."""
+"""Measure the indications that a record is not that of a linear structure in free flight, and explain refusals."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from d2rpick.vibration.locked_lines import StretchLine
     from d2rpick.vibration.midpoint import Reading
 
-# Number of values of tr, and of td, for which the overlap of the deformations is compared with its bounds.
+# Number of values of tr and of td at which the overlap of the deformations is compared with its bounds.
 _CHECKED: Final = 90
 
 # Largest prediction error of an accepted record, relative to the range of the energy [-].
 _MOST_MISSED: Final = 0.5
 # Largest misfit of an accepted record, relative to the range of the energy [-].
 _MOST_MISFIT: Final = 0.3
-# MOST_NEGATIVE: largest size of a negative static energy, relative to the mean vibration energy [-].
+# MOST_NEGATIVE: largest absolute value of a negative static energy, relative to the mean vibration energy [-].
 # _MOST_NEGATIVE_AT_ALL: limit that replaces MOST_NEGATIVE if there is no better model [-].
 MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5
-# Largest change of the static energy in an accepted record, relative to the mean vibration energy [-].
+# Largest accepted change of the static energy in a record, relative to the mean vibration energy [-].
 _MOST_DRIFT: Final = 0.6
-# Largest excess of the overlap over its bounds, relative to the vibration energy, rms over all pairs [-].
+# The overlap may exceed its bounds by at most this fraction of the vibration energy (rms) [-].
 MOST_BEYOND: Final = 0.12
-# Largest size of the harmonics in an accepted record, relative to their fundamental line [-].
+# Largest accepted height of the harmonics, relative to their fundamental line [-].
 _MOST_HARMONIC: Final = 0.05
-# _MOST_UNSTRETCHED: largest deficit of static energy for a static deformation, per mean vibration energy [-].
+# _MOST_UNSTRETCHED: largest shortfall of the static energy of a static deformation, per mean vibration energy [-].
 # _MOST_UNSTRETCHED_AT_ALL: limit that replaces _MOST_UNSTRETCHED if there is no better model [-].
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6
 # Smallest number of states in an accepted record per period of the highest-frequency strong line.
@@ -40,7 +40,7 @@ _FEWEST_PER_PERIOD: Final = 2.4
 
 
 class Doubts(NamedTuple):
-    """Indications that a record is not that of a linear structure in free flight; 0 means that there is no doubt [-].
+    """Indications that a record is not that of a linear structure in free flight; 0 means no doubt [-].
 
     ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
     the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
@@ -63,11 +63,11 @@ class Doubts(NamedTuple):
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Return the reason why the record is refused even if no better model exists; None if it is then accepted."""
+        """Return the reason why the record is refused even if there is no better model; None if it is then accepted."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
-        """Return the first reason why the record is refused under the given limits; None if there is no reason."""
+        """Return the first reason why the record is refused under the given limits; None if it is accepted."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,
@@ -119,7 +119,7 @@ def measure_doubts(
     stretches: tuple[StretchLine, ...],
     scatter: float,
 ) -> Doubts:
-    """Measure what speaks against a reading of the lines of an internal energy, of which a part is static."""
+    """Measure the doubts about one interpretation of the lines of an internal energy that has a static part."""
     spectrum = prediction.spectrum
     mean, share = static.mean, static.share
     line_count = spectrum.lines.poles.size
@@ -140,7 +140,7 @@ def measure_doubts(
 
 
 def _measure_beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """Return the excess of the overlap over its bounds, relative to the vibration energy (rms over pairs) [-]."""
+    """Return how far the overlap exceeds its bounds (rms over pairs of times), relative to the vibration energy [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T

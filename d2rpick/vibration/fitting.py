@@ -30,48 +30,48 @@ if TYPE_CHECKING:
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 
-# Numbers of free parameters of the models: vibration, vibration with plastic work, vibration with preload.
+# Numbers of free parameters of three models: vibration, vibration with plastic work, vibration with preload.
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6
 
 # Numbers of exponentials in q**2 that the matrix-pencil method tries, one for each of the three models.
 _ORDERS: Final = (3, 4, 6)
-# Window length of the matrix-pencil method [cells]; with 1/3 of _MIN_CELLS, noise causes the smallest error.
+# Window length of the matrix-pencil method [cells]; 1/3 of _MIN_CELLS minimises the error due to noise.
 _LAGS: Final = 64
 # Smallest number of cells into which the record is divided.
 _MIN_CELLS: Final = 192
-# Largest number of cells into which the record is divided, so that the method needs at most 5 MB of memory.
+# Largest number of cells into which the record is divided; it limits the memory of the method to 5 MB.
 _MAX_CELLS: Final = 8192
 # Smallest number of cells per period of the strongest oscillation of the energy.
 _CELLS_PER_PERIOD: Final = 24
 
-# Number of samples with which start values are compared and refined at first.
+# Number of samples used for the initial comparison and refinement of starting values.
 COARSE: Final = 400
-# Number of samples with which a fit may be refused before all samples are used.
+# A fit to this many samples may be refused before all samples are used.
 _MEDIUM: Final = 2048
-# Relative decrease of the misfit in a step below which the refinement stops [-].
+# The refinement stops after a step that reduces the misfit by less than this fraction [-].
 _NEAR: Final = 1e-6
-# Largest rms misfit relative to the standard deviation of the energy [-]; a larger misfit may hide another mode.
+# Largest accepted rms misfit, relative to the standard deviation of the energy [-]; more may hide another mode.
 MAX_MISFIT: Final = 0.4
-# Safety factor on the largest variance of the misfit if only some of the samples are used [-].
+# Safety factor on the largest accepted variance of the misfit if only some of the samples are used [-].
 _FAR_TOO_MUCH: Final = 1.2
-# Largest number of start values that are refined, because the first value may not be the best.
+# Maximum number of starting values to refine; more than one, because the first may not be the best.
 STARTS: Final = 3
-# Unexplained fraction of the variance below which no second start value is tried [-].
+# No second starting value is tried if the first one leaves less than this fraction of the variance unexplained [-].
 CERTAIN: Final = 0.01
 _MAX_STEPS: Final = 40
-# Smallest phase of a vibration over the record [rad], 1/10 period; a fit with less is only a drift.
-# None of 1,100 drifts became a vibration when the fit was refined with all samples.
+# Smallest phase angle that a vibration passes through in the record [rad], i.e. 1/10 period; less is a drift.
+# None of 1,100 drifts became a vibration when its fit was refined with all samples.
 _DRIFT: Final = 0.1 * 2 * np.pi
 
-# Smallest derivative of the scaled energy with respect to a parameter that has an effect [-].
+# A parameter has no effect if the derivative of the scaled energy with respect to it is smaller than this [-].
 _NO_EFFECT: Final = 1e-100
-# Largest part of the misfit that neighbouring samples share, relative to the standard deviation of the energy [-].
+# Largest accepted rms of the misfit that neighbouring samples share, relative to the energy's standard deviation [-].
 MAX_STRUCTURE: Final = 0.02
-# Excess of a misfit's covariance over that of white noise above which the misfit has structure [standard deviations].
+# A misfit has structure if its covariance exceeds that of white noise by more than this [standard deviations].
 _DEVIATIONS: Final = 3.0
-# Excess of the covariance over that of white noise at which the structure is certain [standard deviations].
+# The structure is certain if the covariance exceeds that of white noise by this [standard deviations].
 _BEYOND_DOUBT: Final = 6.0
-# Ratio of the misfit structure in few samples to MAX_STRUCTURE above which a fit to all samples would fail [-].
+# A fit to all samples would fail if the misfit structure in a few samples exceeds MAX_STRUCTURE by this factor [-].
 _BEYOND_STRUCTURE: Final = 2.0
 
 
@@ -100,7 +100,7 @@ def fit(
     best = fit_all(few, partial(compute_energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
-    if best[5] < 0:  # The deformations q and -q have the same energy.
+    if best[5] < 0:  # q and -q describe the same energy.
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
@@ -134,12 +134,12 @@ def fit_all(
 
 
 def _is_drift(parameters: Samples) -> bool:
-    """Return True if the frequency is so low that the fit remains a drift even with all samples."""
+    """Return True if the frequency is so low that a fit with all samples would still be a drift."""
     return bool(abs(parameters[0]) < _DRIFT)
 
 
 def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
-    """Return ``most`` evenly spaced samples, by default the number used to compare start values."""
+    """Return ``most`` evenly spaced samples; the default is the number used to compare starting values."""
     stride = -(-s.size // most)
     return s[::stride], e[::stride]
 
@@ -147,7 +147,7 @@ def _take_few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samp
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Refine the start values and return the best result; None if all leave more than ``worst`` of the variance."""
+    """Refine the starting values and return the best fit; None if each leaves more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best = None
     least_cost = worst * variance
@@ -161,7 +161,7 @@ def refine(
 
 
 def _is_structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Return True if the misfit on evenly spaced samples suffices to refuse the fit to all samples."""
+    """Return True if the misfit on evenly spaced samples is large enough to refuse the fit to all samples."""
     return has_clear_structure(e - model(parameters, s)[0], float(np.std(e)))
 
 
@@ -224,7 +224,7 @@ def average_cells(s: Samples, running: Samples, count: int) -> Samples:
 def _find_starts(
     poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int
 ) -> list[Samples]:
-    """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
+    """Return the best parameter vectors to start a fit from, for a model with ``size`` free parameters.
 
     A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p, omega =
     Im p).  For given rates E is linear in products of the other parameters, and their fit ranks the rates and gives the
@@ -269,7 +269,7 @@ def _find_starts(
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
-        # Two start values lead to the same minimum if their phases differ by less than half a radian over the record.
+        # Two starting values lead to the same minimum if their phases over the record differ by less than 0.5 rad.
         if all(
             abs(start[0] - start_before[0]) > 0.5
             or abs(start[1] - start_before[1]) > 0.5
@@ -296,7 +296,7 @@ def refine_parameters(
     squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
     ``doomed``.
     """
-    # The damping of the Levenberg-Marquardt method is small, because the start values are good.
+    # The damping of the Levenberg-Marquardt method is small, because the starting values are good.
     damping = 1e-4
     cost, normal, gradient = _build_normal_equations(parameters, model, s, e)
     free = gradient.size
@@ -361,7 +361,7 @@ def compute_covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Return the rms of the part shared by neighbouring values of ``rest``, beyond ``deviations`` of noise.
+    """Return the rms of the part of ``rest`` that neighbouring values share, as far as it exceeds noise.
 
     The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """
@@ -377,7 +377,7 @@ def measure_structure(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
 
 def has_clear_structure(rest: Samples, spread: float) -> bool:
-    """Return True if the misfit on evenly spaced samples has enough structure that all samples would refuse the fit.
+    """Return True if the structure of the misfit on evenly spaced samples suffices to refuse a fit to all samples.
 
     ``spread`` is the standard deviation of the energy there.
     """

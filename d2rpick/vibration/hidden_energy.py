@@ -1,4 +1,4 @@
-"""Find vibration energy that the lines of a record do not show."""
+"""Find the vibration energy that the spectral lines of a record do not show."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from d2rpick.vibration.locked_lines import ABOVE_SCATTER
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
-# Largest relative variation of a constant level [-], which single precision cannot resolve.
+# Largest relative variation of a level that is treated as constant [-]; single precision resolves no less.
 _RESOLVED: Final = 2e-7
-# _LIKE_LEVEL: largest part of the variation of a static energy that does not fall with the level, as a fraction [-].
+# _LIKE_LEVEL: largest fraction of the variation of a static energy that does not follow the level [-].
 # _MOST_SHARED: upper limit of the correlation of neighbouring misfits [-], so that some states remain independent.
 _LIKE_LEVEL, _MOST_SHARED = 0.3, 0.9
 # Assumed number of lines that are hidden in the misfit.
@@ -23,7 +23,7 @@ _HIDDEN_LINES: Final = 12
 def measure_hidden_pairs(
     static: Samples, level: Samples, noise: float, systematic: float
 ) -> float:
-    """Return the vibration energy that falls as the ``level`` does but has no lines, relative to the level [-].
+    """Return the vibration energy that has no lines but falls with the ``level``, relative to the level [-].
 
     The lines of two modes with equal frequencies and opposite phases cancel each other, so their energy looks static.
     But static energy stays as it is, while that of modes decays with all others.
@@ -53,7 +53,7 @@ def measure_hidden_pairs(
 
 
 def find_most_hidden(rest: Samples) -> float:
-    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit may have [energy].
+    """Return the largest vibration energy that lines hidden in the misfit (n,) of a fit could have [energy].
 
     None of them is higher than the highest line of the rest, and together they are no more than the rest.
     """

@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 
 # Unexplained fraction of the variance above which a fit to 400 samples is refused at once [-].
 HOPELESS: Final = 0.5**2
-# Largest structure of the misfit without a second mode, as a fraction of the fitted energy at the same time [-].
+# A misfit structure larger than this fraction of the fitted energy at the same time indicates a second mode [-].
 MAX_LOCAL_STRUCTURE: Final = 0.1
-# Smallest number of samples; it is four for each parameter of the largest model.
+# Smallest number of samples to which a mode is fitted, four for each parameter of the largest model.
 MIN_SAMPLES: Final = 24
 # Smallest number of samples per energy period pi / omega; with fewer, aliasing may make a fast mode look slow.
 MIN_SAMPLES_PER_PERIOD: Final = 10
-# Largest growth exponent -alpha t over the length t of the record [-]; noise may cause an apparent growth.
+# Largest accepted growth exponent -alpha t over the record length t [-]; noise may cause an apparent growth.
 MAX_GROWTH: Final = 0.3
-# Most negative plastic work, as a fraction of the energy range [-]; fitting errors may make it negative.
+# Most negative accepted plastic work, as a fraction of the energy range [-]; fitting errors may make it negative.
 MIN_PLASTIC: Final = -0.05
-# Largest misfit of a vibration without preload that is attributed to a stiffening spring [-].
+# If a vibration without preload has a misfit of at most this, the misfit is attributed to a stiffening spring [-].
 MAX_OF_SPRING: Final = 0.1
-# Assumed hidden fraction of the vibration energy if a preload is replaced with a stiffening spring [-].
+# Assumed hidden fraction of the vibration energy if a stiffening spring replaces a preload [-].
 _OF_A_PRELOAD: Final = 0.03
 
-# Number of parameters of each model, and number of periods needed to identify it, with the simplest model first.
+# Number of parameters of each model, and number of periods needed to identify the model; the simplest comes first.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -117,7 +117,7 @@ def identify(
     quick: bool = False,
     rates: NDArray[np.complex128] | None = None,
 ) -> Identification:
-    """Fit a vibration to E(t), else one with plastic work, else one with a preload, and judge the fit.
+    """Fit a vibration to E(t), if necessary one with plastic work or, failing that, a preload, and judge the fit.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def identify(
     )
     if (
         quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # All other fits leave a larger misfit than the largest model.
+    ):  # No other model leaves a smaller misfit than the largest model.
         return _is_out_of_reach(time)
     fits = (
         (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
@@ -179,7 +179,7 @@ def identify(
 
 
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
-    """Return the complex exponents of the exponentials that E may contain, per length of the record, shape (k,).
+    """Return the complex exponents of the exponentials that E may contain, times the record length, shape (k,).
 
     A record that is too short to be judged has none.
     """
@@ -192,7 +192,7 @@ def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
 def _choose_first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge the fits, simplest model first, and return the first one that follows the samples, else the best one.
+    """Judge the fits, simplest model first; return the first fit that follows the samples, otherwise the best fit.
 
     If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
@@ -211,7 +211,7 @@ def _choose_first_to_follow(
 def _prefer_through_zero(
     found: Identification, simple: list[Identification]
 ) -> Identification:
-    """Replace a vibration about a preload with one through zero at half its frequency, if both fit almost equally well.
+    """Replace a vibration about a preload with one through zero at half the frequency, if both fit almost equally well.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
@@ -349,7 +349,7 @@ def _judge_attempt(
     e = record.e
     density = count_samples_per_period(
         s, attempt.scaled
-    )  # This number is computed first, because it needs as much memory as all later steps.
+    )  # This number is computed first, because its computation needs as much memory as all later steps.
     remainder = e - attempt.energy
     rms = float(np.sqrt(np.mean(remainder**2)))
     spread = float(np.std(e))
@@ -357,7 +357,7 @@ def _judge_attempt(
     local = attempt.scaled.vibration_energy(s)
     vibration = float(
         np.hypot.reduce(local) / np.sqrt(s.size)
-    )  # The norm avoids an overflow of squares.
+    )  # Computing a norm avoids an overflow of squares.
     # If noise exceeds the vibration, a misfit does not prove that there is a further mode.
     np.maximum(local, max(rms, SOLVER_FLOOR * np.max(local)), out=local)
     local_structure = fitting.measure_structure(np.divide(remainder, local, out=local))

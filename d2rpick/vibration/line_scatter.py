@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 # Upper limit of the correlation of neighbouring misfits [-], so that some of the states remain independent.
 _MOST_SHARED: Final = 0.9
-# Assumed standard deviation of the frequency of a line before the fit, in cycles over the record [-].
-# The assumption before the fit limits the uncertainty of spurious lines that are fitted to noise.
+# Prior standard deviation of the frequency of a line, in cycles over the record [-].
+# The prior limits the uncertainty of spurious lines that are fitted to noise.
 _LOOSE_TURNS: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LineScatter:
-    """Standard deviation of R^2 (R: residual) for one interpretation ``reading`` of the spectral lines on a ``grid``.
+    """Standard deviation of the squared residual for one interpretation ``reading`` of the lines on a ``grid``.
 
     Neighbouring states have the share ``systematic`` of the misfit in common [-].
     """
@@ -37,7 +37,7 @@ class LineScatter:
     systematic: float
 
     def compute_deviation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return the standard deviation of R^2 for pairs of broadcastable times [-]."""
+        """Return the standard deviation of the squared residual for pairs of broadcastable times [-]."""
         tr, td = np.broadcast_arrays(
             np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64)
         )
@@ -47,7 +47,7 @@ class LineScatter:
 
     @cached_property
     def _spread(self) -> Samples:
-        """Return a square root of the covariance matrix of the parameters, shape (p, p)."""
+        """Return a square root of the parameters' covariance matrix, shape (p, p)."""
         spectrum = self.reading.spectrum
         waves = self._scale_by_gain(spectrum.lines)
         mean = self._scale_by_gain(spectrum.mean)
@@ -61,13 +61,13 @@ class LineScatter:
             return np.zeros((design.shape[1], 1))
         loose = self._list_loose_scatters()
         scaled = design * loose / np.sqrt(variance)
-        # The inverse variances of the fit and of the assumption before the fit are added.
+        # The inverse variances of the fit and of the prior are added.
         information, directions = np.linalg.eigh(scaled.T @ scaled)
         roots = directions / np.sqrt(1 + np.maximum(information, 0.0))
         return np.asarray(roots * loose[:, np.newaxis])
 
     def _list_loose_scatters(self) -> Samples:
-        """Return the assumed standard deviation of each parameter before the fit, shape (p,)."""
+        """Return the prior standard deviation of each parameter, shape (p,)."""
         spectrum = self.reading.spectrum
         lines = spectrum.lines
         sizes = np.maximum(np.abs(lines.weights), self.reading.tiny)
@@ -77,11 +77,11 @@ class LineScatter:
         return np.concatenate([sizes, sizes, decays, rates, of_mean])
 
     def _scale_by_gain(self, waves: Exponentials) -> Exponentials:
-        """Return the waves, weighted such that they give the means over the blocks of the grid."""
+        """Return the waves with the weights that give their means over the blocks of the grid."""
         return waves._replace(weights=waves.weights * self.grid.gain(waves.poles))
 
     def _compute_gradient(self, tr: Samples, td: Samples) -> Samples:
-        """Return the derivatives of R^2 with respect to the parameters, shape (n, p) [1/energy, time/1].
+        """Return the derivatives of the squared residual by the parameters, shape (n, p) [1/energy, time/1].
 
         R^2 = 1 + [V(tr) - 2 V(m) + H(m) - C(tr, td)] / H(td), the small change of U within a period left out.
         """
@@ -112,7 +112,7 @@ class LineScatter:
 
 
 def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
-    """Return the derivatives of the waves at times (n,), shape (n, 4 k).
+    """Return the derivatives of the sum of k waves with respect to their 4 k parameters at times (n,), shape (n, 4 k).
 
     The derivatives are with respect to the real and imaginary parts of the weights, then of the poles.
     """
@@ -122,7 +122,7 @@ def _differentiate_waves(waves: Exponentials, times: Samples) -> Samples:
 
 
 def _differentiate_level(waves: Exponentials, times: Samples) -> Samples:
-    """Return the derivatives of H, twice the sum of the sizes of the decaying waves, shape (n, 4 k)."""
+    """Return the derivatives of H, twice the sum of the amplitudes of the decaying waves, shape (n, 4 k)."""
     return _differentiate_coherence(waves, times, times)
 
 

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 # Numbers of exponentials that are tried; each spectral line needs two, and the mean needs at least one.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# _CLEARLY_BETTER: largest ratio of prediction errors at which more exponentials are preferred [-].
+# _CLEARLY_BETTER: more exponentials are preferred if they reduce the prediction error to this fraction or less [-].
 # _PERFECT: relative prediction error below which no more exponentials are tried [-].
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
-# _BETTER: limit that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
-# _OF_A_LINE: smallest ratio of the largest power to the mean power of a misfit that contains a spectral line [-].
+# _BETTER: fraction that replaces _CLEARLY_BETTER if the misfit still contains a spectral line [-].
+# _OF_A_LINE: a misfit contains a spectral line if its largest power is at least this multiple of the mean power [-].
 _BETTER, _OF_A_LINE = 0.97, 16.0
 # Fraction of the record that is fitted to predict the rest of the record [-].
 FIRST_PART: Final = 0.7
@@ -40,29 +40,29 @@ _MOST_LAGS: Final = 340
 # _FEWEST_STATES: smallest number of states in the uniform grid.
 # _MOST_STATES: largest number of states in the uniform grid.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 4.0, 64, 2000
-# Largest deviation of evenly spaced times, as a fraction of an interval [-].
+# Times are treated as evenly spaced if they deviate by at most this fraction of an interval [-].
 _EVEN: Final = 1e-3
-# Smallest ratio of the power of a line to the median power at which the line exceeds white noise [-].
+# A line exceeds white noise if its power is at least this multiple of the median power [-].
 _ABOVE_NOISE: Final = 20.0
-# _ALL_POWER: fraction of the power of the lowest-frequency lines that are together treated as relevant [-].
-# _STRONG_POWER: fraction of the power of the lowest-frequency lines that are together treated as strong [-].
+# _ALL_POWER: the lowest-frequency lines that together have this fraction of the power are treated as relevant [-].
+# _STRONG_POWER: the lowest-frequency lines that together have this fraction of the power are treated as strong [-].
 _ALL_POWER, _STRONG_POWER = 1 - 2e-5, 0.95
 # Length of the first part of the record that is searched for early decaying lines, as a fraction of the record [-].
 _EARLY: Final = 0.25
 # _LEAST_TURNS: smallest number of cycles of a line in the record.
-# _SURE_TURNS: number of cycles above which a line cannot be confused with slow changes of the mean.
-# _MOST_DAMPED: largest damping of a line, as a fraction of its angular frequency [-].
+# _SURE_TURNS: a line with more than this number of cycles cannot be confused with slow changes of the mean.
+# _MOST_DAMPED: largest decay rate of a line, as a fraction of its angular frequency [-].
 # _MOST_DECAY: largest exponent with which a line decays within the record [-].
 _LEAST_TURNS, _SURE_TURNS, _MOST_DAMPED, _MOST_DECAY = 0.25, 1.0, 0.35, 40.0
-# Largest exponent with which noise makes a vibration seem to grow over the record [-].
+# Largest exponent by which noise may make a vibration seem to grow over the record [-].
 _MOST_GROWTH: Final = 0.2
 # _MOST_DECAYS: largest number of decaying exponentials that the mean contains in addition to a constant.
-# _SAME_DECAY: smallest difference, over the record, between the exponents of two decaying exponentials [-].
+# _SAME_DECAY: smallest difference between the exponents by which two exponentials decay over the record [-].
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
 class Grid(NamedTuple):
-    """Means of an energy over blocks of equidistant states: ``time`` and ``energy`` of shape (m,) [time], [energy].
+    """Means of an energy over blocks of equidistant states; ``time`` [time] and ``energy`` [energy] have shape (m,).
 
     A block has ``size`` states at a distance of ``spacing`` [time].  ``strong`` is the number of grid points in a
     period of the fastest strong line [-].
@@ -76,7 +76,7 @@ class Grid(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Return the distance between two successive blocks [time]."""
+        """Return the time between two successive blocks [time]."""
         return self.spacing * self.size
 
     @property
@@ -148,7 +148,7 @@ def make_even_grid(time: Samples, energy: Samples) -> Grid:
 
 
 def _count_turns(time: Samples, values: Samples) -> tuple[float, float]:
-    """Return the numbers of cycles of the highest relevant and of the highest strong frequency in times (n,)."""
+    """Return the number of cycles in times (n,) at the highest relevant frequency, and at the highest strong one."""
     reach = time - time[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
@@ -190,7 +190,7 @@ class Exponentials(NamedTuple):
 
 
 class Spectrum(NamedTuple):
-    """An energy as ``lines`` and a ``mean``, fitted to a grid; ``rest`` (m,) is the misfit [energy]."""
+    """An energy as ``lines`` and a ``mean`` that are fitted to a grid; ``rest`` (m,) is the misfit [energy]."""
 
     lines: Exponentials
     mean: Exponentials
@@ -215,7 +215,7 @@ class Spectrum(NamedTuple):
         )
 
     def count_slow_as_mean(self, span: float) -> Spectrum:
-        """Return the spectrum with all lines in the mean that do not complete a cycle in the ``span`` [time]."""
+        """Return the spectrum after moving all lines that do not complete a cycle in ``span`` [time] to the mean."""
         is_slow = self.lines.poles.imag * span < 2 * np.pi * _SURE_TURNS
         slow = self.lines.some(is_slow)
         mean = self.mean._replace(
@@ -230,7 +230,7 @@ class Spectrum(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """The ``spectrum`` of a grid, the spectrum of its first part, and the error of the prediction from the first part.
+    """The ``spectrum`` of a grid, the spectrum of the grid's first part, and its error in predicting the rest.
 
     ``missed`` is the root mean square deviation from the first part's spectrum, over the whole grid, relative to
     ``swing`` [-]; ``swing`` is the standard deviation of the energy about its trend [energy].
@@ -247,7 +247,7 @@ class Prediction(NamedTuple):
         return Prediction(*spectra, self.missed, self.swing)
 
     def count_slow_as_mean(self, span: float) -> Prediction:
-        """Return the prediction with all lines in the mean that do not complete a cycle in the ``span`` [time]."""
+        """Return the prediction after moving all lines that do not complete a cycle in ``span`` [time] to the mean."""
         return self._replace(
             spectrum=self.spectrum.count_slow_as_mean(span),
             of_first_part=self.of_first_part.count_slow_as_mean(span),
@@ -313,7 +313,7 @@ class _SignalSpace:
 
     @property
     def size(self) -> int:
-        """Return the number of directions of the subspace."""
+        """Return the number of dimensions of the subspace."""
         return int(self.vectors.shape[1])
 
     def poles(self, order: int) -> Complex:

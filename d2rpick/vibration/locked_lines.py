@@ -1,4 +1,4 @@
-"""Find lines locked to other lines in frequency and phase, due to a static deformation or nonlinear springs."""
+"""Find lines that are locked to others in frequency and phase, due to a static deformation or nonlinear springs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lines import Exponentials, Spectrum
 
 # NOTABLE: smallest height of a relevant line, relative to the strongest line [-].
-# _NOTABLE_PARTNER: smallest height of a line to which other lines are locked, relative to the strongest line [-].
+# _NOTABLE_PARTNER: smallest height of a line whose frequency another may follow, relative to the strongest line [-].
 # ABOVE_SCATTER: smallest height of a relevant line, in standard deviations [-].
 NOTABLE, _NOTABLE_PARTNER, ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# _SAME_RATE: largest difference of frequencies that are treated as equal, in cycles over the record [-].
-# _EXACT_RATE: largest phase drift over the record of frequencies that are treated as identical [rad].
+# _SAME_RATE: frequencies that differ by at most this are treated as equal [cycles over the record].
+# _EXACT_RATE: frequencies whose phases drift apart by at most this over the record are treated as identical [rad].
 _SAME_RATE, _EXACT_RATE = 0.1, 0.1
 # _SAME_PHASE: largest phase error of a line that is locked because of a static deformation [rad].
 # _SAME_PHASE_OF_HARMONICS: largest phase error of a harmonic [rad].
@@ -30,7 +30,7 @@ _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
 _THIRD_OF_SPRING, _THIRD_ROOM, _HIGHEST_SECOND = 0.48, 0.3, 0.36
 # Multiples of the frequency of a slowly oscillating deformation at which its energy has spectral lines [-].
 _OWN_MULTIPLES: Final = (1, 2, 3, 4)
-# Largest logarithm of the ratio of two line heights that are treated as equal [-].
+# Line heights are treated as equal if the logarithm of their ratio is at most this [-].
 _SAME_HEIGHT: Final = 0.1
 # _STRONGEST: number of the strongest lines to which the search for harmonics is limited.
 # _HARMONICS: orders of the harmonics that the search identifies.
@@ -98,7 +98,7 @@ def find_stretches(
 def _find_side_lines(
     lines: Exponentials, span: float, scatter: float
 ) -> list[StretchLine]:
-    """Find the side lines of modes that vibrate about a slowly oscillating deformation.
+    """Find the sidebands of modes that vibrate about a slowly oscillating deformation.
 
     A stretch q0 cos(s t + f) gives a mode two further lines, at its rate plus s and less s.  Both are equally high, and
     their rates and phases add up to those of the mode's own line.  The energy of the stretch itself has lines at
@@ -148,7 +148,7 @@ class ThirdHarmonic(NamedTuple):
 
     @property
     def may_be_of_spring(self) -> bool:
-        """Return True if the line may be as high as the third harmonic of a stiffening spring, except for noise."""
+        """Return True if the line, apart from noise, may be as high as the third harmonic of a stiffening spring."""
         if self.second > _HIGHEST_SECOND:
             return False
         room = _THIRD_ROOM * self.expected + ABOVE_SCATTER * self.scatter
@@ -192,7 +192,7 @@ def measure_third_harmonic(
     height = float(abs(first))
     # The third harmonic of a spring has three times the phase of the first one.
     turned_back = third * (first.conj() / abs(first)) ** 3
-    # A line that decays is seen for a part of the window only.
+    # A line that decays is visible in only a part of the window.
     widening = float(np.exp(max(-third_pole.real, 0.0) * span / 2))
     return ThirdHarmonic(
         second / height,
@@ -203,7 +203,7 @@ def measure_third_harmonic(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Return the relative height of phase-locked lines at 3 and more times the frequency of a line [-].
+    """Return the relative height of phase-locked lines at the third and higher multiples of a line's frequency [-].
 
     A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
@@ -249,7 +249,7 @@ def _measure_locked_to(
 
 
 def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
-    """Return the phase of each line in the middle of the window, where it is known best [rad]."""
+    """Return the phase of each line at mid-window, where the phase is most accurate [rad]."""
     return np.asarray(np.angle(lines.weights) + lines.poles.imag * span / 2)
 
 

@@ -24,17 +24,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Mode
 
-    # Measures of n times, as arrays of shape (n,), keyed by name, with NaN for unknown values.
+    # Values for n times, as arrays of shape (n,) keyed by name; unknown values are NaN.
     Columns = Mapping[str, Samples]
     # A function that returns the residual of each tr with its lower and upper bound [-].
-    # The arguments of this function are the residuals computed from the deformations, the times tr, and td.
+    # The function takes the residuals of the deformations, the candidate times tr, and the time td.
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
 # Largest increase of the frozen-deformation error within the timing tolerance [-].
 TOLERATED_GROWTH = 0.05
-# Half-width of the error band of R^2 due to noise, in standard deviations; 2.5 cover 98.8 % of normal errors.
+# Half-width of the error band of the squared residual due to noise [standard deviations].
+# In a normal distribution, 98.8 % of the errors lie within 2.5 standard deviations.
 BAND_DEVIATIONS = 2.5
-# Ratio of the part of R^2 that depends on the phases at td to the damping ratio [-]; in theory, it is at most 2.
+# Fraction of the squared residual that depends on the phases at td, per damping ratio [-]; in theory, at most 2.
 _PHASES_COUNT = 1.5
 
 
@@ -58,7 +59,7 @@ class Deformation(Protocol):
 
 
 class Measured(Record):
-    """Measures of one tr that require known deformations; each measure is None if it is unknown.
+    """Measures of one tr that require known deformations; a measure is None if it is unknown.
 
     ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
     """
@@ -105,7 +106,7 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 
 
 def compared(columns: Columns) -> NDArray[np.bool_]:
-    """Return a mask of the times whose deformation can be compared with the deformation at td."""
+    """Return a mask of the times at which the deformation can be compared with that at td."""
     return ~np.isnan(columns["sign_match"])
 
 
@@ -123,7 +124,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # Relative to a level of almost zero, the error of any other energy may overflow to infinity.
+    ):  # Relative to a level near zero, the error of any other energy may overflow to infinity.
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )
@@ -180,7 +181,7 @@ def band_about(
 
 
 def phase_share(alpha: Samples | float, omega: Samples | float) -> Samples:
-    """Return the fraction of R^2 that depends on the phase of the error at td [-].
+    """Return the fraction of the squared residual that depends on the phase of the error at td [-].
 
     Damping takes energy where a mode moves, none where it stands still.  So the error after td, over the vibration
     after td, is that of the energies at td but for about the damping ratio, ``alpha`` over 2 ``omega``.
@@ -200,7 +201,7 @@ def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
 
 
 def wrong_sign(kinetic: float) -> float:
-    """Return R = sqrt(4 - 3 K) [-], the residual of the level of td with the opposite sign, L^2 = 4 (1 - K).
+    """Return R = sqrt(4 - 3 K) [-], the residual if tr has the level but not the sign of td, L^2 = 4 (1 - K).
 
     Examples
     --------
@@ -246,10 +247,10 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * amplitude
     half_period = np.pi / mode.omega
     still = mode.standstill_after(tr)
-    # Times of zero velocity on both sides of tr, in columns: first those after each tr, then those before.
+    # Times of zero velocity on both sides of tr, in columns: first those after each tr, then those before it.
     steps_after, steps_before = [0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]
     steps = np.repeat([steps_after, steps_before], tr.size, axis=0).T * half_period
-    # Between these times q is monotone.
+    # Between successive times, q is monotone.
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
     nearest = distances.reshape(2, -1).min(axis=0)
@@ -257,17 +258,17 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
 
 
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
-    """Return the time from the first of the ``edges`` until |q - wanted| exceeds ``room``; infinity if it does not.
+    """Return the time from ``edges[0]`` until |q - wanted| first exceeds ``room``; infinity if it never does.
 
     Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself is always inside, even if rounding puts it outside.
+    outside[0] = False  # tr itself counts as inside, even if rounded to outside.
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner = edges[first[column] - 1, column]
     outer = edges[first[column], column]
-    # This value lies outside the band, on the side where q leaves it.
+    # q leaves the band above ``wanted`` if ``side`` is 1, and below if it is -1.
     middle = wanted[column]
     tolerated = room[column]
     side = np.sign(mode.deformation(outer) - middle)
@@ -333,7 +334,7 @@ class Profile(NamedTuple):
         return np.asarray(self.time[next_state] - self.time[next_state - 1])
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """Return by how much each tr (n,) may be wrong before L grows by 0.05, at most the profile's length [time].
+        """Return by how much each tr (n,) may be wrong before L grows by 0.05, up to the length of the profile [time].
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
@@ -358,11 +359,11 @@ class Profile(NamedTuple):
     def _leaving(
         self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples
     ) -> Samples:
-        """Return the distance from each ``tr`` to where the error exceeds ``limit`` [time], by linear interpolation."""
+        """Return the time from each ``tr`` to the point at which linear interpolation reaches an error of ``limit``."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
         t0, e0 = self.time[inside], self.error[inside]
         t1, e1 = self.time[outside], self.error[outside]
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # If there is no sample between tr and the first sample outside, the sample outside is used.
+        # If there is no sample between tr and the first sample outside, this first sample is used.
         leaving_time = np.where(e0 > limit, t1, t0 + share * (t1 - t0))
         return np.asarray(np.abs(leaving_time - tr))

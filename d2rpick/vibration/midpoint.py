@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """An interpretation of a spectrum, which defines which lines are modes.
+    """An interpretation of a spectrum, which states which of its lines are modes.
 
     ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
     all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
@@ -97,7 +97,7 @@ class Reading:
 
     @cached_property
     def _within_period(self) -> Exponentials:
-        """Return how damping changes the vibration energy of each mode within a period; it acts only during motion."""
+        """Return how damping, which acts only during motion, changes the energy of each mode within a period."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
         # With the damping ratio z, the change at the phase theta is z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta).
@@ -105,7 +105,7 @@ class Reading:
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 
     def energies_of_modes(self, t: float) -> Samples:
-        """Return the vibration energy of each mode at a time, not negative, shape (k,) [energy]."""
+        """Return the vibration energy of each mode at a time, at least 0, shape (k,) [energy]."""
         decayed = self._peak_energies * np.abs(self.modes.waves(t))
         within_period = self._within_period
         return np.maximum(
@@ -119,21 +119,21 @@ class Reading:
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """Return the factor in the coherence that depends on tr [energy]; the last axis counts the modes."""
+        """Return the tr-dependent factor of the coherence [energy]; the last axis indexes the modes."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """Return the factor in the coherence that depends on td [-]; the last axis counts the modes."""
+        """Return the td-dependent factor of the coherence [-]; the last axis indexes the modes."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X, the product of the deformations at tr and td, limited to its bounds [energy]."""
+        """Return X, the product of the deformations at tr and td, clipped to its bounds [energy]."""
         bound = self.bound(tr, td)
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return X without limiting it to its bounds, which noise or a wrong model may make it exceed [energy]."""
+        """Return X without clipping; noise or a wrong model may make X exceed its bounds [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)

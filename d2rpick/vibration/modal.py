@@ -51,49 +51,49 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Smallest number of states of a record in which spectral lines are identified.
+# Smallest number of states in which spectral lines are identified.
 _FEWEST_STATES: Final = 32
-# Largest static energy that may be a fitting error, as a fraction of the mean vibration energy [-].
+# A static energy up to this fraction of the mean vibration energy may be a fitting error [-].
 _NO_STATIC: Final = 0.12
-# Smallest relative energy range of a vibration [-]; single precision cannot resolve less.
+# Smallest relative energy range of a vibration [-]; single precision cannot resolve a smaller range.
 _RESOLVED: Final = 2e-7
-# Smallest number by which energies are divided, as a fraction of the energy range of the record [-].
+# Smallest divisor of energies, as a fraction of the energy range of the record [-].
 _TINY: Final = 1e-12
-# Smallest relative difference of mean energy and half peak energy at which no line is ambiguous [-].
+# No line is ambiguous if mean energy and half of the peak energy differ by at least this fraction of the latter [-].
 _AMBIGUOUS: Final = 0.08
 
 # Number of times per period of the highest-frequency relevant line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# Number of parts of each interval between evaluated deformations, for linear interpolation of the energy.
+# Number of parts into which each interval between evaluated deformations is divided to interpolate energies.
 _FINER: Final = 4
 
 # _LITTLE_LEFT: largest misfit of modes that are evidence of a flight, relative to the energy range [-].
 # _LITTLE_MISSED: largest prediction error of modes that are evidence of a flight, relative to the energy range [-].
-# _EXACT: largest error of exact modes, as a fraction of these two limits [-].
-# _SLOW_TOO: largest error at which slow modes are distinguished from other slow changes, as such a fraction [-].
+# _EXACT: modes are treated as exact if their errors are at most this fraction of the limits for a flight [-].
+# _SLOW_TOO: slow lines are accepted as modes if the errors are at most this fraction of the limits for a flight [-].
 _LITTLE_LEFT, _LITTLE_MISSED, _EXACT, _SLOW_TOO = 0.05, 0.2, 0.1, 0.2
 
-# _LEAST_HALF: half-width of the error band of R^2 before known errors widen the band [-].
+# _LEAST_HALF: half-width of the error band of the squared residual before known errors widen the band [-].
 # _NOT_LINEAR: relative error of a deformation because real structures are nonlinear [-].
-# For a shell box, R deviated by 0.015 to 0.018 (rms) from the R of all its nodes.
+# The residual R of a shell box deviated by 0.015 to 0.018 (rms) from the R computed with all its nodes.
 _LEAST_HALF, _NOT_LINEAR = 0.006, 0.015
-# Half-width of the error band of R^2 above which the modes are poorly identified [-].
+# Modes are poorly identified if the half-width of the error band of the squared residual exceeds this [-].
 _VAGUE_HALF: Final = 0.2
 # Number of times at which the error band is evaluated.
 _SOME_TIMES: Final = 64
-# Effect on R^2 of the energy that the lines do not explain, as a factor on its fraction of the energy [-].
-# Noise in the energies at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 deviations bound 90 %.
+# Effect of unexplained energy on the squared residual, per unexplained fraction of the energy [-].
+# Noise at tr (weight 1) and midway to td (weight 2) adds up to sqrt(5); 1.6 standard deviations bound 90 %.
 _REST_COUNTS: Final = 1.6 * np.sqrt(5)
-# Largest correlation of neighbouring misfits that is treated as noise, in standard errors [-].
+# Correlations of neighbouring misfits up to this are treated as noise [standard errors].
 _CHANCE: Final = 2.0
-# _DRIFT_COUNTS: effect on R^2 of a mean energy that changes in the flight, as a factor on the change [-].
-# _NEGATIVE_COUNTS: effect on R^2 of a negative or too small static energy, as a factor on its relative error [-].
+# _DRIFT_COUNTS: effect of a changing mean energy on the squared residual, per relative change in the flight [-].
+# _NEGATIVE_COUNTS: effect of a negative or too small static energy on the squared residual, per relative error [-].
 _DRIFT_COUNTS, _NEGATIVE_COUNTS = 0.35, 1.4
-# _BENT_ALIKE: effect on R^2 of the second harmonic of a stiffening spring, if both deformations are equal [-].
-# _BENT_ACROSS: additional effect on R^2 of the second harmonic, if the deformations are orthogonal [-].
+# _BENT_ALIKE: effect of the second harmonic of a stiffening spring on the squared residual of equal deformations [-].
+# _BENT_ACROSS: additional effect of the second harmonic on the squared residual of orthogonal deformations [-].
 _BENT_ALIKE, _BENT_ACROSS = 3.0, 5.0
-# Largest possible R^2, which is that of equal and opposite deformations [-].
+# Largest possible squared residual, which is that of equal and opposite deformations [-].
 _MOST_OPPOSED: Final = 4.0
 # Assumed squared difference of a slowly oscillating deformation at two times, relative to its mean square [-].
 _SWINGING_COUNTS: Final = 4.0
@@ -108,7 +108,7 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies [energy] at times so close that linear interpolation is accurate enough [time]."""
+    """Elastic energies [energy] at times [time] so close together that linear interpolation is accurate enough."""
 
     time: Samples
     energy: Samples
@@ -137,7 +137,7 @@ class ModalVibration:
     states_per_period : float
         States of the record in a period of the fastest line that is told from noise [-].
     scatter : LineScatter
-        Scatter of R^2 that follows from that of the record.
+        Scatter of the squared residual that follows from that of the record.
     swinging : float
         Mean energy in parts of the record that swing in a way that no mode does [energy].
     bent : float
@@ -176,7 +176,7 @@ class ModalVibration:
         ) is None
 
     def as_last_resort(self) -> ModalVibration:
-        """Return the vibration with wider limits for refusal, for use if no better model exists."""
+        """Return the vibration with wider limits for refusal, for use when no better model exists."""
         return replace(self, last_resort=True)
 
     @property
@@ -190,7 +190,7 @@ class ModalVibration:
         return self._predicts_within(_EXACT)
 
     def _predicts_within(self, share: float) -> bool:
-        """Return True if the error of the modes, apart from white noise, is below ``share`` of the acceptable error."""
+        """Return True if the modes' error, apart from white noise, is below ``share`` of the acceptable error."""
         doubts = self.doubts
         follows = _predicts_within(share, doubts.missed, doubts.misfit, self.systematic)
         return self.signed and follows
@@ -207,7 +207,7 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
-        """Return the modes with their energies at ``td``, with the lowest frequency first."""
+        """Return the modes with their energies at ``td``, in ascending order of frequency."""
         poles = self.reading.modes.poles
         energies = self.reading.energies_of_modes(td)
         rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
@@ -226,7 +226,7 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Return V, not negative, in the shape of ``t`` [energy]."""
+        """Return V, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
@@ -234,7 +234,7 @@ class ModalVibration:
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Return T, not negative, in the shape of ``t`` [energy]."""
+        """Return T, at least 0, in the shape of ``t`` [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
@@ -249,7 +249,7 @@ class ModalVibration:
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
-        """Return frozen-deformation errors at each ``time`` before ``td`` [-], from values computed once for all td."""
+        """Return frozen-deformation errors at each ``time`` before ``td`` [-]; values shared by all td are cached."""
         last = int(np.searchsorted(self.time, td))
         elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2
@@ -281,14 +281,14 @@ class ModalVibration:
         )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Return half of the width of the error band of R^2 for pairs of times [-]."""
+        """Return half of the width of the error band of the squared residual for pairs of times [-]."""
         off, below, above = self._compute_errors(tr, td)
         return np.asarray(off + (below + above) / 2)
 
     def _compute_errors(
         self, tr: Samples | float, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the error of R^2 for pairs of times, and how much lower and higher other interpretations are [-].
+        """Return the error of the squared residual of pairs of times, and how far other readings lower or raise it [-].
 
         Alternatives are other interpretations of the lines, and what the kinetic energy says: each is on one side.
         """
@@ -329,7 +329,7 @@ class ModalVibration:
 
     @property
     def _structure_of_rest(self) -> float:
-        """Return the fraction of the misfit that neighbouring states have in common, beyond chance [-]."""
+        """Return the fraction of the misfit that neighbouring states share, as far as it exceeds chance [-]."""
         chance = _CHANCE / np.sqrt(self.reading.spectrum.rest.size)
         return max(self.systematic - float(chance), 0.0)
 
@@ -353,15 +353,15 @@ class ModalVibration:
         return measures.band_about(np.square(stated), off, above, below)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Return the fraction of vibration energy at td that a hidden mode needs to explain the band for each tr [-].
+        """Return the fraction of vibration energy at td that a hidden mode needs to explain the band of each tr [-].
 
-        A hidden mode in opposite phase at tr and td adds four times its share to R^2.
+        A hidden mode in opposite phase at tr and td adds four times its share to the squared residual.
         """
         return self.half_width(tr, td) / 4
 
     @property
     def fallen(self) -> float:
-        """Return by how much the static energy falls in the window, relative to the mean vibration energy [-]."""
+        """Return the decrease of the static energy in the window, relative to the mean vibration energy [-]."""
         ends = self.time[[0, -1]]
         level = self.reading.level_of_modes(ends)
         static = self.reading.spectrum.mean.at(ends) - level / 2
@@ -369,7 +369,7 @@ class ModalVibration:
 
     @cached_property
     def _phase_share(self) -> float:
-        """Return the fraction of R^2 that depends on the phases of all modes at td [-]."""
+        """Return the fraction of the squared residual that depends on the phases of all modes at td [-]."""
         modes = self.reading.modes
         poles = modes.poles
         sizes = np.abs(modes.weights)
@@ -378,7 +378,7 @@ class ModalVibration:
 
     @cached_property
     def _wrong(self) -> float:
-        """Return the error that widens the error band of all pairs equally [-]."""
+        """Return the error that widens the error bands of all pairs equally [-]."""
         doubts = self.doubts
         if self.reading.no_static:
             return doubts.harmonic  # The alternative interpretation already accounts for the error of the mean.
@@ -392,7 +392,7 @@ class ModalVibration:
     def _compute_shift_of_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> tuple[Samples, Samples]:
-        """Return by how much R^2 falls and rises if another interpretation of the spectral lines is correct [-].
+        """Return by how much other interpretations of the spectral lines lower and raise the squared residual [-].
 
         Part of the static energy may be due to spectral lines hidden in the misfit.  That part is limited by the energy
         that the misfit can hide, and by the static energy itself.  A mode that does not complete a cycle is confused
@@ -415,7 +415,7 @@ class ModalVibration:
 
     @cached_property
     def has_slow_mode(self) -> bool:
-        """Return True if the energy of a mode does not complete a cycle in the window."""
+        """Return True if the energy of some mode does not complete a cycle in the window."""
         window = float(self.time[-1] - self.time[0])
         return bool(np.any(self.reading.modes.poles.imag * window < 2 * np.pi))
 
@@ -467,7 +467,7 @@ def identify_modal(
     misfit = prediction.spectrum.error / prediction.swing
     systematic = _correlate_neighbours(prediction.spectrum.rest)
     if not _predicts_within(_SLOW_TOO, prediction.missed, misfit, systematic):
-        # What is no sum of lines, as under friction, changes slowly beside them.
+        # An energy that is not a sum of lines, as under friction, has slow changes that are not modes.
         prediction = prediction.count_slow_as_mean(grid.span)
     if not prediction.spectrum.lines.poles.size:
         return None
@@ -480,7 +480,7 @@ def identify_modal(
 def confirm_by_kinetic_energy(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Return the result of the internal energy, with a wider band, or else the result of the kinetic energy."""
+    """Return the result from the internal energy with a wider band, or from the kinetic energy if only it is usable."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
@@ -507,7 +507,7 @@ def _can_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
 def _predicts_within(
     share: float, missed: float, misfit: float, systematic: float
 ) -> bool:
-    """Return True if the error of lines, apart from white noise, is below a ``share`` of the acceptable error.
+    """Return True if the error of the lines, apart from white noise, is below ``share`` of the acceptable error.
 
     ``missed`` and ``misfit`` as in `Doubts`; neighbouring states share the fraction ``systematic``.
     """
@@ -544,7 +544,7 @@ def _separate_stretches_from_springs(
 
 
 class _Interpretation(NamedTuple):
-    """The ``best`` reading of the lines, ``others`` that the record allows, and the ``static`` energy beside modes."""
+    """The ``best`` interpretation of the lines, ``others`` that are possible, and the ``static`` part of the energy."""
 
     best: Reading
     others: tuple[Reading, ...]
@@ -586,7 +586,7 @@ def _read(
     doubts = measure_doubts(
         reading, interpretation.static, prediction, grid, stretches, scatter
     )
-    # Heat or a drift that the first part predicts is no plastic flow, and leaves the lines as they are.
+    # Heat or a drift that the first part predicts is not plastic flow and does not affect the lines.
     follows = _predicts_within(_EXACT, doubts.missed, doubts.misfit, systematic)
     if follows and np.all(np.diff(interpretation.static.energy) > 0):
         doubts = doubts._replace(drift=0.0)
@@ -618,7 +618,7 @@ def _choose_interpretation(
     kinetic: bool,
     systematic: float,
 ) -> _Interpretation:
-    """Choose whether lines of stretches are modes, and whether a part of the mean energy is static.
+    """Decide whether the lines of static deformations are modes, and whether part of the mean energy is static.
 
     In the ``plain`` reading all lines are modes and all of the mean is vibration.  ``may_be_spring`` is True if a
     second harmonic may be that of a stiffening spring, ``systematic`` the fraction of the misfit that neighbouring
@@ -639,7 +639,7 @@ def _choose_interpretation(
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
 
-    # If the lines of stretches were modes and explained all of the mean, nothing would be static.
+    # The lines of static deformations, taken as modes, may explain all of the mean energy; then no energy is static.
     half_of_all = plain.level_of_modes(time) / 2
     excess = abs(float(np.mean(spectrum.mean.at(time) - half_of_all)))
     explains_mean = excess < _AMBIGUOUS * float(np.mean(half_of_all))
@@ -667,7 +667,7 @@ def _read_first_part(
     stretches: tuple[StretchLine, ...],
     scatter: float,
 ) -> Reading:
-    """Return the interpretation of the lines of the first part of the record, without the misfit."""
+    """Return the interpretation of the lines in the first part of the record, without the misfit."""
     first = prediction.of_first_part
     first_stretches: tuple[StretchLine, ...] = ()
     if stretches:
@@ -681,12 +681,12 @@ def _read_first_part(
 
 
 def _compute_effect_of_deformation(off: Samples | float, squared: Samples) -> Samples:
-    """Return the error of R^2 if the difference of two deformations has the relative error ``off`` [-]."""
+    """Return the error of the squared residual due to the relative error ``off`` of a deformation difference [-]."""
     return np.asarray(2 * off * np.sqrt(squared) + np.square(off))
 
 
 def _compute_sine(squared: Samples) -> Samples:
-    """Return the sine of the angle between deformations of equal size whose R^2 is ``squared``, not negative [-]."""
+    """Return the sine of the angle between equally large deformations with the squared residual ``squared`` [-]."""
     return np.asarray(np.sqrt(np.maximum(squared * (4 - squared), 0.0)) / 2)
 
 
@@ -706,7 +706,7 @@ def _mask_modes(lines: Exponentials, stretches: tuple[StretchLine, ...]) -> Mask
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
-    """Return times in a window so close that a parabola through three of them locates a minimum [time]."""
+    """Return times in a window [time], so closely spaced that a parabola through three of them locates a minimum."""
     rates = reading.modes.poles.imag
     sizes = np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]

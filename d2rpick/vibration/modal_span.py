@@ -1,4 +1,4 @@
-"""Find the window in which the modes of one structure continue undisturbed, if no other evidence shows a flight."""
+"""Find the window in which the modes of a structure continue undisturbed, if no other evidence shows a flight."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
 
-# Number of equal parts of the record whose boundaries are the possible ends of windows.
+# Number of equal parts of the record; windows end at the boundaries of the parts.
 _PARTS: Final = 16
-# Beginnings of windows that reach the end of the record, as fractions of the record [-].
+# Starts of the trial windows that extend to the end of the record, as fractions of the record [-].
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Outside its window, a record follows the modes if its mean energies over part of the shortest period deviate little.
-# _MEANS_PER_PERIOD: number of mean energies that are checked in each period of the highest-frequency mode.
-# _MOST_OFF: largest deviation of the mean energy from the modes' prediction, relative to the vibration energy [-].
-# The mean energy may also deviate by ERRORS_OFF standard errors from that predicted by the modes.
+# A record follows the modes outside their window if its mean energies over part of the shortest period deviate little.
+# _MEANS_PER_PERIOD: number of mean energies that are checked per period of the highest-frequency mode.
+# _MOST_OFF: largest deviation of a mean energy from the modes' prediction, relative to the vibration energy [-].
+# The limit of the deviation is _MOST_OFF or, if larger, ERRORS_OFF standard errors.
 _MEANS_PER_PERIOD, _MOST_OFF = 8, 0.02
 
 
@@ -53,7 +53,7 @@ def find_described(
     first = next((described for described in grown if described is not None), None)
     if first is None or first.vibration.is_exact:
         return first
-    # The end of a load at its beginning may convince, but the next window is exact then.
+    # If the window begins in a load, its modes may seem good, but those of the next window are exact.
     second = next(grown, None)
     return second if second is not None and second.vibration.is_exact else first
 
@@ -71,7 +71,7 @@ def _grow_described(history: History, window: Span) -> ModalWindow | None:
 
 
 def get_inner_window(history: History, guess: Span) -> Span:
-    """Return the part of a window that begins and ends at multiples of 1/16 of the record, so that many td share it."""
+    """Return the part of a window that starts and ends at multiples of 1/16 of the record, so that many td share it."""
     first = history.start
     last = history.end
     part = (last - first) / _PARTS
@@ -84,7 +84,7 @@ def get_inner_window(history: History, guess: Span) -> Span:
 
 
 def _list_windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Yield trial windows: first the guessed window, then later windows that reach the end of the record."""
+    """Yield trial windows: first the guessed window, then later windows that extend to the end of the record."""
     if guess is not None:
         inner = get_inner_window(history, guess)
         if inner.start < td <= inner.end:
@@ -112,7 +112,7 @@ def _identify_states(
 
 
 def _grow_window(history: History, described: ModalWindow) -> ModalWindow:
-    """Extend a window as far as the record follows its modes and identify these again, until it no longer changes."""
+    """Extend a window as far as the record follows its modes and identify them again, until nothing changes."""
     for _ in range(MOST_REFITS):
         span = _find_reach(history, described)
         if span == described.span:
@@ -151,7 +151,7 @@ def _find_reach(history: History, found: ModalWindow) -> Span:
 def _count_up_to_last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Return the number of states up to the last one that deviates from the modes; all of them precede the window."""
+    """Return the index after the last state that deviates from the modes; all of the states precede the window."""
     if time.size < width:
         return int(time.size)
     with np.errstate(

@@ -1,4 +1,4 @@
-"""Decide which model of the vibration is reliable at a td, and describe the vibration by this model.
+"""Decide which vibration model is reliable at a td, and describe the vibration by this model.
 
 The order is that of `MODELS`: an oscillator that describes the record before the modes of the structure and counted
 swings unless it leaves much over, and these before the energy alone.  The result is a `Vibration`: the energy around
@@ -50,16 +50,16 @@ SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 # Residual of a run without vibration after td [-]; a pair with a larger residual preserves nothing.
 NOTHING_KEPT: Final = 1.0
-# Last part of the time before td in which a tr saves little time, as a fraction of this time [-].
+# A tr in this last fraction of the time before td saves little time [-].
 NEAR_TD: Final = 0.25
-# _OF_INTERVAL: largest distance of a closest match from the true minimum of the error, in sampling intervals [-].
-# _OF_INTERVAL_BY_MODES: the same limit as _OF_INTERVAL for modes, which describe the energy between the states [-].
-# For modes, 93 % of 2200 closest matches were within 1/8 interval; the error of the others hardly changed.
+# _OF_INTERVAL: assumed upper bound of the distance from the best sample to the true error minimum [sampling intervals].
+# _OF_INTERVAL_BY_MODES: the same limit if modes describe the energy between the states [sampling intervals].
+# For modes, 93 % of 2200 closest matches were within 1/8 interval of the minimum; the other errors hardly changed.
 _OF_INTERVAL, _OF_INTERVAL_BY_MODES = 0.5, 0.125
 
 
 class Compared(NamedTuple):
-    """Deformations at the times from ``first`` to ``last`` [time], which can be compared with the deformation at td.
+    """Deformations at the times from ``first`` to ``last`` [time], all of which can be compared with that at td.
 
     ``profile`` returns their frozen-deformation error before a td; it is None if there is only one mode, which has a
     closed form. ``band`` is that of a residual.
@@ -74,7 +74,7 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Vibration:
-    """The vibration for one td, as described by the best reliable model.
+    """The vibration as described by the best reliable model for one td.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Vibration:
         matches = self.profile.minima() if self.profile else ()
         if (
             self.basis == "modal"
-        ):  # With many modes, the level of the total energy is no criterion.
+        ):  # With many modes, the level of the total energy does not show which tr are suitable.
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(
@@ -184,7 +184,7 @@ class Vibration:
         )
 
     def _least_deformed(self) -> tuple[float, ...]:
-        """Return the time of least elastic energy, which keeps the static part, if no tr preserves the vibration."""
+        """Return the time of least elastic energy, which keeps only the static part, if no tr keeps the vibration."""
         if not self.keeps_nothing or self.compared is None or self.profile is None:
             return ()
         times = self.profile.time
@@ -201,7 +201,7 @@ class Vibration:
         )
 
     def measured(self, times: Samples) -> Columns:
-        """Return the measures of each time as tr if its deformation can be compared with that at td."""
+        """Return the measures of each time as tr, if its deformation can be compared with that at td."""
         return measure_all([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
@@ -227,7 +227,7 @@ class Vibration:
         return np.append(self.whole.edges(), self.profile.time if self.profile else ())
 
     def reach(self, moments: Moments) -> Samples:
-        """Return the uncertainty of each moment [time]; for a closest match, it is a fraction of a profile interval.
+        """Return the uncertainty of each moment [time], which is a fraction of a profile interval for a closest match.
 
         A match lies at a minimum of the error: in the same interval if only states are known, and much nearer to the
         vertex of a parabola if the error between them is known.
@@ -241,7 +241,7 @@ class Vibration:
         )
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
-        """Return a mask of the times at which the deformation can be compared with the deformation at td."""
+        """Return a mask of the times at which the deformation can be compared with that at td."""
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
@@ -263,7 +263,7 @@ class Vibration:
 def find_moments(
     vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Return the candidate times of each vibration, as `Vibration.moments` does; vibrations of one mode share the work.
+    """Return the candidate times of each vibration, as `Vibration.moments` does, mode by mode for greater speed.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def find_moments(
 def measure_all(
     vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
 ) -> tuple[Samples, Columns]:
-    """Return the energy of each tr (n,), and its measures if its deformation is comparable with that at its td.
+    """Return the energy of each tr (n,), and its measures if its deformation can be compared with that at its td.
 
     The times of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
@@ -328,7 +328,7 @@ def measure_all(
 
 
 def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
-    """Yield groups of indices of vibrations with the same mode and window, and single indices of all others."""
+    """Yield groups of indices of vibrations with the same mode and window, and the single indices of all others."""
     groups: dict[object, list[int]] = {}
     for position, vibration in enumerate(vibrations):
         whole = vibration.whole
@@ -343,7 +343,7 @@ def _group_alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 
 
 class Evidence(NamedTuple):
-    """The models that were found in a record, whether or not they are reliable at a td.
+    """The models found in a record, whether or not they are reliable at a td.
 
     ``fit`` is None only if no oscillator was fitted; ``span`` is the window that it describes.  ``given`` is True for
     a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
@@ -375,19 +375,19 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """Return the states per period of the highest-frequency line [-]; None if no lines were identified."""
+        """Return the number of states per period of the highest-frequency line [-]; None if no line is known."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.states_per_period if modal else None
 
     @property
     def states_per_strong_period(self) -> float | None:
-        """Return the states per period of the highest-frequency strong line [-]; None if no lines were identified."""
+        """Return the number of states per period of the highest-frequency strong line [-]; None if no line is known."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 
     @property
     def has_model(self) -> bool:
-        """Return True if, at some td, a model may be used rather than only the samples of the energy."""
+        """Return True if a model, rather than only the energy samples, may be used at some td."""
         fit = self.fit
         return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
 
@@ -411,7 +411,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _compare_with_signs(whole, basis, model)
-    # If neighbouring misfits are correlated, there is a further mode, which the modal model describes better.
+    # Correlated neighbouring misfits show a further mode, which the modal model describes better.
     # If the misfits are white noise, they do not show a further mode.
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
@@ -424,7 +424,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
 
 
 def _compare_with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
-    """Return a vibration with signed deformations, and with levels and times of the total energy."""
+    """Return a copy of the vibration with signed deformations; the level at td remains that of the total energy."""
     first = model.comparable_since(whole.td)
     return replace(
         whole,
@@ -450,7 +450,7 @@ def is_doubtful(whole: Vibration) -> bool:
 
 
 def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Return the reliable model of the total energy at ``td``: an oscillator, or else the samples."""
+    """Return the reliable model of the total energy at ``td``: an oscillator if possible, otherwise the samples."""
     fit = evidence.fit
     whole = describe_energy_at(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
@@ -464,7 +464,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
             claim = "the given oscillator does not describe"
         else:
             claim = "no single oscillator describes"
-        # Fitting lines needs fewer states than determining a level, and the fit refuses records with too few states.
+        # Fitting lines needs fewer states than determining a level, and the fit itself refuses too few states.
         aliasing = () if evidence.has_sure_modes else _find_aliasing(history, fit)
         return samples(
             unknown=f"{claim} the record: {fit.reason}",
@@ -491,7 +491,7 @@ def find_energy_at(history: History, td: float, evidence: Evidence) -> Vibration
 def describe_energy_at(
     history: History, td: float, evidence: Evidence
 ) -> SampledEnergy:
-    """Return the best description of the energy, even if unreliable at ``td``: an oscillator, or else the samples."""
+    """Return the best description of the energy, even if unreliable at ``td``: an oscillator, otherwise the samples."""
     fit = evidence.fit
     span = evidence.span
     if fit and fit.mode and span:
@@ -513,7 +513,7 @@ def _find_aliasing(history: History, fit: Identification) -> tuple[str, ...]:
 
 
 def _describe_gap(time: Samples) -> str:
-    """Return the longest interval without states as text, if it is much longer than the others."""
+    """Return a text with the longest interval without states, if this interval is much longer than the others."""
     steps = np.diff(time)
     longest = int(np.argmax(steps))
     if steps[longest] <= _GAP * float(np.median(steps)):

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Number of samples per block, so that intermediate results fit into the cache of the processor.
+# Number of samples per block, small enough for intermediate results to fit into the processor cache.
 BLOCK: Final = 8192
-# Largest number of steps of the root search, with which bisection alone reaches full precision.
+# Largest number of steps of the root search; it suffices for bisection alone to reach full precision.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
-# Energy below which values may be solver errors, as a fraction of the highest energy; typical errors are 1/10 of it.
+# Largest energy that may be a solver error, as a fraction of the highest energy [-]; typical errors are 1/10 of it.
 SOLVER_FLOOR: Final = 1e-4
 # Largest deformation that is treated as zero, as a fraction of the amplitude [-].
 _ZERO = 1e-9
@@ -139,17 +139,17 @@ class Mode(SignedAmplitudes):
         return compute_energy_and_jacobian(own_gradient, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
-        """Return the first time at or after ``t`` with q' = 0 [time]; the next one is half a period later."""
+        """Return the first time at or after ``t`` with q' = 0 [time]; such times are half a period apart."""
         cosine, sine = self._velocity_parts
-        # The velocity, cosine cos x + sine sin x with x = omega (t - origin), is 0 at x = phase + n pi.
+        # With x = omega (t - origin), the velocity cosine cos x + sine sin x is 0 at x = phase + n pi.
         phase = np.arctan2(-cosine, sine)
         angle = self.omega * (np.asarray(t) - self.origin)
         half_turns = np.ceil((angle - phase) / np.pi)
         return np.asarray(self.origin + (phase + np.pi * half_turns) / self.omega)
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) with q' = 0, in ascending order [time]."""
-        if not start < end:  # For infinite times, the phase would not be finite.
+        """Find the times in (start, end) with q' = 0 [time], in ascending order."""
+        if not start < end:  # For infinite times, the phase would be infinite.
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(
@@ -158,7 +158,7 @@ class Mode(SignedAmplitudes):
         return tuple(times[(times > start) & (times < end)].tolist())
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) of the energy's local maxima, in ascending order [time].
+        """Find the times in (start, end) at which the energy has a local maximum [time], in ascending order.
 
         At q' = 0, q'' = -omega_0**2 (q - q_0), so that E'' = 2 q q'' < 0 requires q (q - q_0) > 0.
         """
@@ -167,7 +167,7 @@ class Mode(SignedAmplitudes):
         return tuple(times[q * (q - self.preload) > 0].tolist())
 
     def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end) at which q equals ``level_q``, ascending and accurate to rounding [time].
+        """Find the times in (start, end) at which q equals ``level_q`` [time], ascending and accurate to rounding.
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
@@ -176,15 +176,15 @@ class Mode(SignedAmplitudes):
         )
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
-        """Find the times in (start, td) at which the energy equals that at ``td``, in ascending order [time]."""
+        """Find the times in (start, td) at which the energy equals that at ``td`` [time], in ascending order."""
         return tuple(self.all_level_crossings(np.array([td]), start)[1].tolist())
 
     def all_level_crossings(
         self, td: Samples, start: float
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find the level crossings for every ``td`` (n,) at once; return the index of the td and the time of each."""
+        """Find the level crossings for every ``td`` (n,) at once; return the td index and the time of each crossing."""
         level = self.deformation(td)
-        # Each zero of q is one crossing of the level zero, whatever the sign of the rounding error.
+        # Each zero of q is a single crossing of the level zero, whatever the sign of the rounding error.
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))

@@ -29,26 +29,26 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# Largest misfit at which the sign of the deformation is certain, as a fraction of the vibration energy at td [-].
+# The sign of the deformation is certain if the misfit is at most this fraction of the vibration energy at td [-].
 _DROWNED = 0.2
-# Largest phase difference of times that are treated as equal [rad].
+# Times whose phases differ by at most this are treated as equal [rad].
 _ZERO = 1e-9
 
-# "crossing": the energy crosses the target energy.
-# "extremum": the energy has an extremum near the target energy.
+# "crossing": the energy crosses its level at td.
+# "extremum": the energy has an extremum near its level at td.
 # "match": the deformation of several modes is similar to that at td.
 # "start": the start of a flight in which nothing vibrates.
-# "given": the user gave the time.
+# "given": the user gave this time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 # Safety factor on the second differences of the energy, because E'' may be larger between the samples [-].
 # With a factor of 1.25, the error bounds contain 99 % of the true crossings of random vibrations.
 # The safety factor was tested with at least 8 samples per period.
 _BEND_RESERVE = 1.25
-# Number of standard deviations in the error of a time; 3 cover 99.7 % of normal errors.
+# Number of standard deviations that bound the error of a time; 3 cover 99.7 % of normal errors.
 _DEVIATIONS = 3.0
-# Number of standard deviations of a sum of rounding errors, which are independent; 2.6 cover 99 %.
+# Number of standard deviations that bound a sum of independent rounding errors; 2.6 cover 99 %.
 _ROUNDING_DEVIATIONS = 2.6
-# Ratio of the largest systematic misfit to its rms [-], which is that of a vibration.
+# Assumed ratio of the largest systematic misfit to its rms [-], which holds for a sinusoidal misfit.
 _PEAK_OF_REST = sqrt(2)
 # Safety margin for times between the samples, as a fraction of the output interval [-].
 _BETWEEN_SAMPLES = 1e-3
@@ -63,7 +63,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """Return the energy at a time [energy], from the modes if they describe that time, else from the samples."""
+        """Return the energy at a time [energy], from the modes if they describe that time, otherwise the samples."""
         if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
@@ -77,12 +77,12 @@ class SampledEnergy:
         return False
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Return the times in (start, end] at which the energy peaks, in ascending order [time]."""
+        """Return the times in (start, end] at which the energy peaks [time], in ascending order."""
         peaks = self.history.peaks
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
     def crossings(self, since: float) -> Passages:
-        """Return the times from ``since`` to td at which the energy crosses the level, and whether it rises (k,)."""
+        """Return the times (k,) from ``since`` to td at which the energy crosses the level, and whether it rises."""
         time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
         in_question = (since <= times) & (times < self.td)
@@ -97,7 +97,7 @@ class SampledEnergy:
         return near[near >= since]
 
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
-        """Return times and energies from the last sample before ``since`` up to td, with td itself at its level."""
+        """Return times and energies from the last sample before ``since`` to td, which has the energy of the level."""
         first, last = np.searchsorted(self.history.time, (since, self.td))
         states_before = slice(max(int(first) - 1, 0), int(last))
         time = self.history.time[states_before]
@@ -114,7 +114,7 @@ class SampledEnergy:
 
 
 class OscillatorEnergy(SampledEnergy):
-    """The ``mode`` of a ``fit`` that describes a record in the window ``span``, for a ``td`` in this window."""
+    """A ``mode``, the ``fit`` by which it describes a record in the window ``span``, and a ``td`` in this window."""
 
     mode: Mode
 
@@ -141,7 +141,7 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # Even if all of the misfit were in this period, it would be too small.
+            return None  # Even if all of the misfit were here, it would be too small.
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         # Both energies may underflow to 0.
         if vibration > 0 and scatter <= _DROWNED * vibration:
@@ -150,7 +150,7 @@ class OscillatorEnergy(SampledEnergy):
         return f"{finding}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
-        """Return the energy E at the given times, in their shape [energy]."""
+        """Return the energies at the given times, in the shape of the times [energy]."""
         return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
@@ -163,11 +163,11 @@ class OscillatorEnergy(SampledEnergy):
 
     @property
     def before(self) -> float:
-        """Return a time just before the span, so that the span's first sample is treated like all others [time]."""
+        """Return a time [time] just before the span, so that the span's first sample is treated like all others."""
         return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
-        """Return the crossing times, from samples before the span and exact inside it, and whether the energy rises."""
+        """Return the crossing times, interpolated before the span and exact inside it, and whether the energy rises."""
         times = np.maximum(
             self.mode.level_crossings(self.td, self.before), self.span.start
         )
@@ -187,20 +187,20 @@ class OscillatorEnergy(SampledEnergy):
         return times[is_before], rising[is_before]
 
     def standstills(self) -> Samples:
-        """Return the times in the span up to td at which the energy has an extremum [time]."""
-        # The time td itself may be an extremum, which rounding may place before td.
+        """Return the times in the span, up to td, at which the energy has an extremum [time]."""
+        # td itself may be an extremum, which rounding may place before td.
         end = self.td - _ZERO / self.mode.omega
         times = np.maximum(self.mode.extrema(self.before, end), self.span.start)
         return times[self.within(times)]
 
     def edges(self) -> Samples:
-        """Return the extrema of the energy and the ends of the span; the energy is monotone between them [time]."""
+        """Return the times of the energy extrema and span ends, between which the energy is monotone [time]."""
         return np.concatenate(
             [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
         )
 
     def reach(self, times: Samples) -> Samples:
-        """Return the uncertainty of the crossing times due to the fit, sampling and printed digits [time]."""
+        """Return the uncertainty of the crossing times due to the fit, the sampling and the printed digits [time]."""
         return self._each(
             times,
             lambda inside: compute_fitted_reach(
@@ -233,7 +233,7 @@ class OscillatorEnergy(SampledEnergy):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Moments:
-    """Candidate times for tr before any measure is computed, as columns of shape (n,).
+    """Candidate times for tr, before any error is computed, as columns of shape (n,).
 
     Noise makes tens of thousands, and few of them are examined singly.  ``tr`` [time]; ``kind``: index of the kind's
     name; ``rising``: 1 if the energy rises, -1 if it falls, 0 if neither.
@@ -262,7 +262,7 @@ class Moments:
 
     @classmethod
     def joined(cls, some: Iterable[Moments]) -> Moments:
-        """Join several moments in the order in which they are given."""
+        """Concatenate several moments in the given order."""
         return cls(
             *map(
                 np.concatenate,
@@ -297,7 +297,7 @@ class Moments:
 def find_moments_of_mode(
     seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Return the moments of one mode in one window, ascending, for each td for which it is ``seen``.
+    """Return the moments of one mode in one window for each ``seen`` energy and its td, in ascending order.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
     """
@@ -314,7 +314,7 @@ def find_moments_of_mode(
         [*(up for _, up in early), mode.energy_slopes(times)[0] > 0]
     )
     turns = seen[int(td.argmax())].standstills()
-    # The time td itself may be an extremum, which rounding may place before td.
+    # td itself may be an extremum, which rounding may place before td.
     of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
     moments = Moments.of_level(
@@ -336,7 +336,7 @@ def find_moments_of_mode(
 def compute_sampled_reach(
     history: History, times: Samples, td: float, level: float
 ) -> Samples:
-    """Return the distance to the true crossing [time] if tr is interpolated linearly between samples.
+    """Return the error of a tr that is interpolated linearly between samples: its distance from the crossing [time].
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def compute_sampled_reach(
 def compute_fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
-    """Return the distance to the true crossing [time] if tr and the level are those of the fitted oscillator.
+    """Return the error of a tr that is computed, like the level, from the fitted oscillator [time].
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
     record about it, and the systematic part of the misfit.  Arguments and result are those of
@@ -404,7 +404,7 @@ def compute_fitted_reach(
 
 
 def _estimate_local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
-    """Return the systematic misfit near each time: its rms, increased where the vibration is larger [energy]."""
+    """Return the rms of the systematic misfit near each time, increased if the vibration is larger [energy]."""
     return np.asarray(
         fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
     )
@@ -417,7 +417,7 @@ def _find_cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
 
 
 def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
-    """Return largest error and mean square of the interpolated energy due to printed digits [energy].
+    """Return the largest error and the mean square error of interpolated energies due to printed digits [energy].
 
     Energy and time of both neighbours are off by up to half a quantum each, uniformly distributed.
     """
@@ -428,7 +428,7 @@ def _compute_rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     interpolated = history.energy[cell] + slope * distance
     of_energy = _compute_half_quanta(history.energy_precision, interpolated)
     of_time = slope * _compute_half_quanta(history.time_precision, at)
-    # The variance of a uniform distribution is a third of its squared half-width; interpolation averages two of them.
+    # A uniform distribution has a variance of a third of its squared half-width; interpolation averages two values.
     weights = (1 - share) ** 2 + share**2
     square = (of_energy**2 + of_time**2) / 3 * weights
     return of_energy + np.abs(of_time), square
@@ -440,7 +440,7 @@ def _compute_half_quanta(precision: Precision, values: Samples) -> Samples:
 
 
 def estimate_curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
-    """Return the largest |E''| near ``at``, from four second divided differences around it [energy/time^2].
+    """Return the largest |E''| near ``at``, from the four surrounding second divided differences [energy/time^2].
 
     The result is zero if the record has fewer than three samples.
     """

@@ -1,4 +1,4 @@
-"""Compute the motion of a floating oscillator, free or rigid, in closed form: two masses, a spring, no support.
+"""Compute the motion of a floating oscillator (two masses, a spring, no support), free or rigid, in closed form.
 
 Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers in this
 module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended mass ``M`` with displacement
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Limits of stiffness and masses, beyond which products and quotients overflow; real values are far from them.
+# Limits of the stiffness and the masses, beyond which products overflow; real values are far from these limits.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
 class State(NamedTuple):
-    """Displacements ``z`` (frame), ``y`` (suspended mass) and velocities ``vz``, ``vy``; numbers or arrays."""
+    """Displacements ``z`` (frame) and ``y`` (suspended mass) with velocities ``vz`` and ``vy``: numbers or arrays."""
 
     z: Values
     y: Values
@@ -50,7 +50,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Oscillator:
-    """A floating oscillator; raise RangeError unless stiffness and masses are in 1e-100 to 1e100 and alpha is finite.
+    """A floating oscillator; raise RangeError unless stiffness and masses are from 1e-100 to 1e100 and alpha is finite.
 
     ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time].
     A slightly negative alpha, as a fit to scattered samples may give, makes the motion grow.
@@ -95,7 +95,7 @@ class Oscillator:
 
     @property
     def _squared_damped_rate(self) -> float:
-        """omega_2**2 [1/time^2], negative if overdamped; a difference of squares would lose digits or overflow."""
+        """omega_2**2 as a product, which loses no digits [1/time^2]; it is negative if the oscillator is overdamped."""
         return (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
@@ -129,7 +129,7 @@ class Oscillator:
         return State(z, y, velocity - frame * rate, velocity + suspended * rate)
 
     def free_on_grid(self, start: State, step: float, count: int) -> State:
-        """Return the states at ``step * arange(count)`` of free motion from ``start``; this is faster than ``free``.
+        """Return the states at ``step * arange(count)`` of free motion from ``start``, faster than ``free`` does.
 
         On an even grid, t = t_row + t_column, every exponential is a product of a factor per row and one per
         column of a table, so a displacement is a matrix product of rank four.  Agrees with ``free`` to a few
@@ -154,7 +154,7 @@ class Oscillator:
         centre, velocity = self._centre(start)
 
         def displacement(share: float) -> Values:
-            """Return the displacement of the mass that takes the fraction ``share`` of the deformation."""
+            """Return the displacement of a mass whose fraction of the deformation is ``share``."""
             swing = share * amplitude * turn_row
             terms = [
                 swing.real,
@@ -168,7 +168,7 @@ class Oscillator:
             return np.asarray(table.ravel()[:count])
 
         def speed(share: float) -> Values:
-            """Return the velocity of the mass that takes the fraction ``share`` of the deformation."""
+            """Return the velocity of a mass whose fraction of the deformation is ``share``."""
             swing = share * rate * amplitude * turn_row
             table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
             return np.asarray(
@@ -203,7 +203,7 @@ class Oscillator:
         return np.asarray(self.stiffness / 2 * (state.y - state.z) ** 2)
 
     def vibration_energy(self, state: State) -> Values:
-        """Return the energy of the vibration: of the spring, plus mu r'^2/2 of the relative motion [energy]."""
+        """Return the energy of the vibration: the spring energy plus mu r'^2/2 for the relative motion [energy]."""
         return np.asarray(
             self.internal_energy(state)
             + self.reduced_mass / 2 * (state.vy - state.vz) ** 2
@@ -242,7 +242,7 @@ class Oscillator:
         kappa = np.sqrt(-square)
         slow_rate = self.omega_0**2 / (self.alpha / 2 + kappa)
         slow = np.exp(-slow_rate * t)
-        # The faster exponential relative to the slower one, and 1 minus this ratio.
+        # The ratio is that of the faster exponential to the slower one.
         ratio = np.exp(-2 * kappa * t)
         difference = -np.expm1(-2 * kappa * t)
         return slow * (1 + ratio) / 2, slow * difference / (2 * kappa)
@@ -262,13 +262,13 @@ def _compute_path(alpha: float, t: Values) -> Values:
 def compute_lacking_energy(
     oscillator: Oscillator, reference: State, switched: State
 ) -> Values:
-    """Return the vibration energy that ``switched`` lacks compared with ``reference``, both states at td [energy]."""
+    """Return the vibration energy that the state ``switched`` lacks compared with the state ``reference`` [energy]."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
 
 
 def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
-    """Return an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
+    """Return an oscillator with the same deformation as ``mode`` about its preload, and its state at ``time``.
 
     An energy history contains neither masses nor the motion of the centre of mass; they are chosen so that the
     deformation equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
@@ -281,7 +281,7 @@ def make_from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Return the energy mode of ``oscillator`` that starts at rest except for the frame velocity ``v0``.
+    """Return the vibration mode of an ``oscillator`` whose frame has the velocity ``v0`` at time 0 and all else rests.
 
     Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
     squared.
@@ -350,7 +350,7 @@ class Replay:
 
 
 class Trajectory(NamedTuple):
-    """Motion on an even grid of ``time`` (n,): ``state`` and both energies, as arrays of the same shape."""
+    """Motion at evenly spaced times ``time`` (n,): ``state`` and both energies, as arrays of the same shape."""
 
     time: Values
     state: State
@@ -365,7 +365,7 @@ def compute_trajectory(
     dt: float,
     switched: Replay | None = None,
 ) -> Trajectory:
-    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, switched if ``switched`` is given [time].
+    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end`` [time]; ``switched`` defines the rigid window, if any.
 
     Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt equals a switch time that is written
     alike.

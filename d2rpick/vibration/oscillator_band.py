@@ -1,4 +1,4 @@
-"""Compute the error band of an identified oscillator's residual, due to noise, damping and hidden modes."""
+"""Compute the error band of an identified oscillator's residual due to noise, damping and hidden modes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
 
-# Largest effect on R^2 of a hidden mode that raises only the upper bound of the residual, not its value [-].
+# A hidden mode with at most this effect on the squared residual raises only the upper bound of the residual [-].
 _HARMLESS: Final = 0.25**2
-# Effect on R^2 of a hidden fraction of harmonics of a nonlinear spring, as a factor on this fraction [-].
+# Effect of the harmonics of a nonlinear spring on the squared residual, per hidden fraction of the energy [-].
 _HARMONIC_COUNTS: Final = 8.0
 
 
@@ -49,13 +49,13 @@ def residual_band(
     off = scatter + share * squared + bent
     opposed = _count_opposed(fit, tr, td)
     decayed = _count_decayed(fit, tr, td)
-    # The misfit may hide a lasting mode or an early decaying mode; the one with the larger effect is assumed.
+    # The misfit may hide a lasting mode or a mode that decays early; the larger effect of the two is assumed.
     hidden = np.maximum(fit.hidden_share * opposed, decayed)
     stated_now, low, high = measures.band_about(
         squared, off, hidden, fit.hidden_share * squared
     )
     # A hidden mode is assumed to exist with a probability of 1/2.
-    # Because of this probability, the stated residual includes half of the effect beyond solver errors.
+    # The stated residual therefore includes half of the effect that exceeds the solver errors.
     solver_error = SMALLEST * mode.vibration_energy(tr) / mode.vibration_energy(td)
     beyond_solver = np.maximum(
         max(fit.hidden_share - SMALLEST, 0.0) * opposed, decayed - solver_error
@@ -65,13 +65,13 @@ def residual_band(
 
 
 def _count_opposed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a hidden damped mode whose deformations at tr and td are opposite extremes [-]."""
+    """Return the squared residual of a hidden damped mode whose deformations at tr and td are opposite extremes [-]."""
     assert fit.mode is not None
     return np.asarray(np.square(1 + np.exp(fit.mode.alpha / 2 * (td - tr))))
 
 
 def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Samples:
-    """Return R^2 of a mode that the fit leaves out at tr, and that has decayed at td [-].
+    """Return the squared residual of a mode that the fit omits at tr and that has decayed by td [-].
 
     The deformation at tr holds its energy, which is compared with the vibration that is left at td.
     """
@@ -85,7 +85,7 @@ def _count_decayed(fit: Identification, tr: Samples, td: Samples | float) -> Sam
 def _compute_deviation(
     fit: Identification, tr: Samples, td: Samples | float
 ) -> Samples:
-    """Return the standard deviation of R^2 for each tr (n,), due to the uncertainty of the fitted parameters [-].
+    """Return the standard deviation of the squared residual for each tr (n,), due to uncertain fitted parameters [-].
 
     The covariance is scaled to a unit diagonal first: its parameters have different units.
     """

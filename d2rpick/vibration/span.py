@@ -28,43 +28,43 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
 
-# _BEGINNINGS: distances of the beginnings of trial windows from td, as fractions of the time from the start to td [-].
-# _ENDS: distances of the ends of trial windows from td, as fractions of the time from td to the end [-].
-# One of the trial windows fills most of any flight of several periods.
+# _BEGINNINGS: trial windows begin at these distances before td, as fractions of the time from the start to td [-].
+# _ENDS: trial windows end at these distances after td, as fractions of the time from td to the end [-].
+# For any flight of several periods, one of the trial windows fills most of the flight.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Distances of the ends of further trial windows before td, as fractions of the time from the start to td [-].
-# The further trial windows are needed if td lies in the next contact.
+# Further trial windows end at these distances before td, as fractions of the time from the start to td [-].
+# Further trial windows are needed if td lies in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # Windows begin and end at fixed marks, so that neighbouring td share windows and fits.
-# Ratio of the distances of successive marks from the start of the bounds [-].
+# Ratio of the distances of successive marks from the start [-].
 _MARKS = 0.87
-# _LEAST_PERIODS: smallest number of periods of a window that an oscillator describes; fewer may fit by chance.
-# _MOST: smallest fraction of the fitted samples in a window that an oscillator describes [-].
+# _LEAST_PERIODS: smallest number of periods in a window that an oscillator describes; fewer may fit by chance.
+# _MOST: shortest window that an oscillator may describe, as a fraction of the initially fitted window [-].
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# Largest ratio of misfits without and with the ends of a window at which the ends are not part of the flight [-].
+# The ends of a window are cut off if this reduces the misfit to at most this fraction [-].
 _MUCH_BETTER = 0.7
-# The record leaves the fitted oscillator if the mean error over a part of a period exceeds all of three limits.
-# _SHARE_OFF: limit of the mean error as a fraction of the vibration energy [-].
-# ERRORS_OFF: limit of the mean error in standard errors, which white noise exceeds once in a million means.
-# _STRUCTURES_OFF: limit of the mean error as a multiple of the systematic misfit [-].
+# The record leaves the fitted oscillator if a mean error over part of a period exceeds all three of these limits.
+# _SHARE_OFF: limit of the mean error, as a fraction of the vibration energy [-].
+# ERRORS_OFF: limit of the mean error [standard errors]; white noise exceeds it once in a million means.
+# _STRUCTURES_OFF: limit of the mean error, as a multiple of the systematic misfit [-].
 # _MEANS_PER_PERIOD: number of mean errors per period.
 _SHARE_OFF, ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Number of means per energy period that are used to detect a mode in only a part of the window.
+# Number of means per energy period that are used to detect a mode in only part of the window.
 _MEANS_PER_ENERGY_PERIOD = 4
-# Smallest fraction of the bounds described by an oscillator that is used for every td in its window [-].
+# An oscillator that describes at least this fraction of the bounds is used for every td in its window [-].
 _MOST_OF_BOUNDS = 0.5
 # Largest number of times that a growing window is fitted again; two are usual.
 MOST_REFITS = 8
 
-# Largest ignored energy of a hidden mode, as a fraction of the vibration energy [-]; it is the error of solvers.
+# Hidden modes with at most this fraction of the vibration energy are treated as solver errors and ignored [-].
 SMALLEST: Final = 1e-3
-# Largest number of lines in a spectrum, which suffices for 800 periods of the energy.
+# Largest number of lines in a spectrum, which suffices for 800 energy periods.
 _MOST_LINES: Final = 8192
-# Number of points per line of a spectrum, so that its peak is resolved.
+# Number of points per line of a spectrum, sufficient to resolve the peak of the line.
 _FINER: Final = 4
-# Number of cells per period of the highest-frequency line, so that means over cells still contain most of the line.
+# Number of cells per period of the highest-frequency line; the means over these cells still show most of the line.
 _CELLS_PER_PERIOD: Final = 4
-# Pair of times without any state between them.
+# Pair of times with no state between them.
 _NO_STATE: Final = (np.inf, np.inf)
 
 
@@ -76,7 +76,7 @@ class Span(NamedTuple):
 
 
 class SpanSearch(NamedTuple):
-    """Where and how an oscillator is searched in a record.
+    """Settings of the search for an oscillator in a record.
 
     Parameters
     ----------
@@ -98,14 +98,14 @@ class SpanSearch(NamedTuple):
     quick: bool = False
 
     def fit(self, window: Span) -> Identification:
-        """Return the oscillator fitted to the states in a window, or the given one compared with them."""
+        """Fit an oscillator to the states in a window, or compare the given oscillator with them."""
         return fit_window(self.history, window, self.oscillator, quick=self.quick)
 
 
 def limit_bounds(
     bounds: Span, td: float, after: float | None, landing: float | None
 ) -> Span:
-    """Return bounds that begin at the end of the load ``after`` and end at the landing, if these are given [time].
+    """Return bounds from the end of the load ``after`` to the landing, if these times are given [time].
 
     A given time on the other side of td cuts the bounds at td.
     """
@@ -154,7 +154,7 @@ def find_oscillator(
 def _add_what_is_hidden(
     history: History, fit: Identification, span: Span | None
 ) -> Identification:
-    """Add to an accepted fit the energy of a mode that may be hidden in the misfit in its window or ``span``."""
+    """Add to an accepted fit the energy of a mode that its misfit may hide in its window or in ``span``."""
     if not fit.describes_record or fit.mode is None:
         return fit
     described = span or Span(fit.start, fit.end)
@@ -165,7 +165,7 @@ def _add_what_is_hidden(
 def _estimate_what_is_hidden(
     history: History, described: Span, _: float, *, fit: Identification
 ) -> Identification:
-    """Return a fit with the hidden energy. It is cached, so that situations can recognise that they share a fit."""
+    """Return a fit with the hidden energy. It is cached, so that situations can tell that they share a fit."""
     assert fit.mode is not None
     share = estimate_hidden_share(*history.between(fit.start, fit.end), fit.mode)
     times, deviations = measure_deviations(*history.between(*described), fit)
@@ -179,7 +179,7 @@ def _estimate_what_is_hidden(
 def find_described_span(
     search: SpanSearch, td: float
 ) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that one oscillator describes, or the last such window before td.
+    """Find the longest window around td that a single oscillator describes; otherwise, the last such window before td.
 
     First the search tries parts of the record, long ones first, until one oscillator describes a part.  Then the window
     grows both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
@@ -194,7 +194,7 @@ def find_described_span(
     up_to_td = Span(search.bounds.start, _mark(search.bounds, td))
     refused = {}
     for window in _list_windows_around(search.bounds, td, whole=search.whole):
-        # Only the misfit of the window up to td is shown.
+        # Only the misfit of the window up to td is shown to the user.
         quickly = search.quick or window != up_to_td
         span, fit = _grow_span(search._replace(quick=quickly), td, window)
         if span:
@@ -207,7 +207,7 @@ def find_described_span(
 def find_longest_described(
     history: History, bounds: Span, whole: bool
 ) -> tuple[Span, Identification] | None:
-    """Find a window with most of the ``bounds`` that one oscillator describes; None if there is none.
+    """Find a window that fills most of the ``bounds`` and that a single oscillator describes; None if there is none.
 
     The window is the same for every td in it.  The search starts in the middle of the bounds, which the window
     contains.  A smaller window is found only from its td.  ``whole`` has the same meaning as in `SpanSearch`.
@@ -231,7 +231,7 @@ def find_longest_described(
 def fit_window(
     history: History, window: Span, oscillator: Mode | None = None, *, quick: bool
 ) -> Identification:
-    """Fit an oscillator to the states in a window, or compare a given one with them; ``quick`` as for `identify`."""
+    """Fit an oscillator to the states in a window, or compare a given one with them; see `identify` for ``quick``."""
     time, _ = history.between(*window)
     return _fit_states(history, get_ends(time), oscillator, quick)
 
@@ -249,14 +249,14 @@ def _fit_states(
 
 @remember
 def _find_rates(history: History, ends: tuple[float, ...]) -> NDArray[np.complex128]:
-    """Return the complex exponents in the energies between two states; quick and full fits share them."""
+    """Return the complex exponents found in the energies between two states; quick and full fits share the result."""
     return find_rates(*history.between(*(ends or _NO_STATE)))
 
 
 def _find_reach(
     history: History, bounds: Span, anchor: float, fit: Identification
 ) -> Span | None:
-    """Return the span of a fit, extended from the middle of its window if the anchor lies in that window.
+    """Return the window of a fit, extended from its middle if the anchor lies in the window.
 
     Many td share one span; starting from the middle of the window gives all of them the same span.
     """
@@ -286,7 +286,7 @@ def _find_span_of_mode(
     rms: float,
     structure: float,
 ) -> Span | None:
-    """Find the window around ``anchor`` in which the record follows a mode with this misfit."""
+    """Find the window around ``anchor`` in which the record follows a mode whose misfit is given."""
     time, energy = history.between(*bounds)
     period = 2 * np.pi / mode.omega
     steps = np.diff(time)
@@ -310,7 +310,7 @@ def _find_span_of_mode(
         ahead,
         states_behind,
     )
-    # A mean over ``width`` samples extends half of them beyond its middle.
+    # A mean over ``width`` samples includes half of these samples on each side of its middle.
     left_end = 0 if last_before is None else time.size - last_before + width // 2
     right_end = time.size - 1 if first_after is None else first_after - 1 - width // 2
     return (
@@ -340,7 +340,7 @@ def _find_first_off(
         deviation = energy[inside] - mode.energy(time[inside])
         running = _average_running(deviation, begin - inside.start, behind, ahead)
         means = np.abs(running[:BLOCK])
-        # A mean that is not a number exceeds every limit.
+        # NaN exceeds every limit.
         loud = np.flatnonzero(~(means <= room))
         limit = _SHARE_OFF * mode.vibration_energy(time[begin + loud])
         far = loud[~(means[loud] <= limit)]
@@ -350,7 +350,7 @@ def _find_first_off(
 
 
 def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Samples:
-    """Return means of ``behind`` values before each value and ``ahead`` after it, starting at the index ``first``."""
+    """Return means of the ``behind`` values before and the ``ahead`` values after each value, from ``first`` on."""
     needed = values[max(first - behind, 0) :]
     width = behind + 1 + ahead
     sums = np.zeros(values.size - first + width)
@@ -361,7 +361,7 @@ def _average_running(values: Samples, first: int, behind: int, ahead: int) -> Sa
 
 
 def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Span]:
-    """Yield trial windows: first windows around td, longest first, then windows before td."""
+    """Yield trial windows: first those around td, in descending order of length, then those before td."""
     start, end = bounds
     mark_of_td = _mark(bounds, td)
     beginnings = [start]
@@ -392,7 +392,7 @@ def _list_windows_around(bounds: Span, td: float, *, whole: bool) -> Iterator[Sp
 
 
 def _mark(bounds: Span, time: float, after: int = 0) -> float:
-    """Return the last mark at or before ``time``, or the first ``after`` it; the ends of the bounds are marks, too."""
+    """Return the last mark up to ``time`` or, if ``after`` is 1, the first mark after it; the bounds count as marks."""
     start, end = bounds
     if time <= start:
         return start
@@ -406,7 +406,7 @@ def _mark(bounds: Span, time: float, after: int = 0) -> float:
 def _grow_span(
     search: SpanSearch, td: float, window: Span
 ) -> tuple[Span | None, Identification]:
-    """Fit the window and extend it while the record follows the fit; repeat until the window no longer changes."""
+    """Fit the window and extend it while the record follows the fit; repeat until the window stays the same."""
     bounds = search.bounds
     fit = search.fit(window)
     span = window
@@ -417,7 +417,7 @@ def _grow_span(
             _LEAST_PERIODS * 2 * np.pi / fit.mode.omega,
             _MOST * (window.end - window.start),
         )
-        # If the period is much longer than the record, means would need more samples than exist.
+        # If the period is much longer than the record, the means would need more samples than there are.
         possible = shortest <= bounds.end - bounds.start
         anchor = min(td, window.end)
         grown = _find_reach(search.history, bounds, anchor, fit) if possible else None
@@ -425,7 +425,7 @@ def _grow_span(
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            # The fit fails, for example, if the window is too short.
+            # The fit fails if, for example, the window is too short.
             if not fit.describes_record:
                 return None, fit
             return _clear_ends(search, grown, fit)
@@ -437,7 +437,7 @@ def _grow_span(
 def _clear_ends(
     search: SpanSearch, span: Span, fit: Identification
 ) -> tuple[Span, Identification]:
-    """Cut off half a period at each end where the record leaves the fit, and fit the rest again.
+    """Cut off half a period at each end at which the record leaves the fit, and fit the rest again.
 
     There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
     samples much better, it determines the window.
@@ -459,7 +459,7 @@ def _clear_ends(
 
 
 def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
-    """Return the fraction of the vibration energy that a further mode, hidden in the misfit, may have [-].
+    """Return the fraction of the vibration energy that a further mode hidden in the misfit may have [-].
 
     This share is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most
     1.
@@ -477,7 +477,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
     misfit = energy - mode.energy(time)
     remainder = average_cells(s, integrate_by_trapezia(s, misfit), count)
     decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
-    # The range is from one period in the record to the highest frequency that the cells resolve.
+    # The frequencies range from one period per record to the highest frequency that the averaging cells resolve.
     visible = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     lines = np.abs(np.fft.rfft(remainder * decay, _FINER * count))
     strongest = float(lines[visible].max())
@@ -489,7 +489,7 @@ def estimate_hidden_share(time: Samples, energy: Samples, mode: Mode) -> float:
 def measure_deviations(
     time: Samples, energy: Samples, fit: Identification
 ) -> tuple[Samples, Samples]:
-    """Return times, and the deviation of the energy from the fit near each time as far as it exceeds noise.
+    """Return times [time], and by how much the energy near each time deviates from the fit beyond noise.
 
     A further mode that decays fast is hidden in the misfit of the whole record, but not in its first periods.  Each
     deviation is the largest mean over a quarter of a period of the energy, within one such period.

@@ -1,4 +1,4 @@
-"""Determine the sign of a deformation whose energy returns to its minimum in each half cycle, for any spring law.
+"""Determine the sign of a deformation whose energy returns to its minimum in each half cycle, whatever the spring law.
 
 Each of these minima is a passage through zero: the energy above the floor is elastic, and its root is the deformation,
 which changes its sign there.  Plastic work raises the floor; heat and drift move it slowly.  If the minima do not lie
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Smallest change of the energy after an extremum that is counted, as a fraction of the previous change [-].
+# An extremum is counted if the energy then changes by at least this fraction of its previous change [-].
 _SWING: Final = 0.2
-# Largest deviation of a minimum on the lower envelope from the line through its neighbours, as a fraction [-].
+# Largest deviation of a minimum on the lower envelope from the line through its neighbours, per local amplitude [-].
 _OFF_FLOOR: Final = 0.02
-# Largest fraction of the minima off the lower envelope at which half cycles are counted [-].
+# Half cycles are counted if at most this fraction of the minima lies off the lower envelope [-].
 _MOST_OFF: Final = 0.1
 # Smallest number of minima that define a lower envelope.
 _FEWEST: Final = 5
 # Smallest relative difference in length of neighbouring half cycles in a beat [-].
 # The difference in length is about half of the energy fraction of the other mode, which is therefore 0.02.
 _UNEVEN: Final = 0.009
-# _MOST_BEATING: largest fraction of the half cycles that alternate without a beat of two modes [-].
-# _STRETCHED: smallest ratio of relative differences in length and in height in a beat [-]; a preload gives 0.3.
+# _MOST_BEATING: if a larger fraction of the half cycles alternates, two modes beat [-].
+# _STRETCHED: smallest ratio of relative length difference to relative height difference in a beat [-]; preload: 0.3.
 _MOST_BEATING, _STRETCHED = 0.75, 1.3
 # Factor by which the residual may be larger or smaller because the spring law is unknown [-].
 # In 1,368 pairs of 12 springs that stiffen by up to 200 %, 98 % of the residuals above 0.1 were within this factor.
 _OF_ANY_SPRING: Final = 1.5
-# _OF_THE_FLOOR: effect of a hidden mode on the residual, as a factor on the square root of its energy fraction [-].
+# _OF_THE_FLOOR: effect of a hidden mode on the residual, per square root of its energy fraction [-].
 # In theory, the factor is 2, but the lower envelope shows only a part of a hidden mode.
-# _UNRESOLVED: additional effect on the residual of motion that the states do not resolve [-].
-# In 1,378 records of two modes, 98.2 % of the residuals below 0.3 were in the error band.
+# _UNRESOLVED: additional contribution to the residual from motion that the states do not resolve [-].
+# In 1,378 records of two modes, 98.2 % of the residuals below 0.3 lay in the error band.
 _OF_THE_FLOOR, _UNRESOLVED = 5.0, 0.05
 
 
@@ -113,7 +113,7 @@ class Swings(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Return the residual of each tr (n,) and its bounds, due to the unknown spring law and to hidden modes.
+        """Return the residual of each tr (n,) with its bounds, which allow for an unknown spring law and hidden modes.
 
         A hidden mode is as likely as none, so half of its energy is stated.
         """
@@ -148,7 +148,7 @@ class Swings(SignedAmplitudes):
 
     @cached_property
     def _excursions(self) -> Samples:
-        """Return the distance of each minimum from the straight line through all minima, shape (k,) [energy]."""
+        """Return the distance of each minimum from the straight line fitted to all minima, shape (k,) [energy]."""
         since_first = self.bottoms - self.bottoms[0]
         line = np.polyfit(since_first, self.floor, 1)
         return np.asarray(self.floor - np.polyval(line, since_first))
@@ -232,7 +232,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
     """Return the indices of the energy extrema, and the last extremum that is completely visible."""
     turning_points = find_turns(energy)[0]
     last = energy.size - 2
-    # So many extrema can only be noise.
+    # This many extrema can only be noise.
     if 4 * turning_points.size > energy.size:
         return np.zeros(0, dtype=np.intp), last
     turning_points = np.concatenate([[0], turning_points, [energy.size - 1]])
@@ -258,7 +258,7 @@ def _find_turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 
 def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
-    """Return values on straight lines through points, extrapolated from the first two and the last two points."""
+    """Return values on the straight lines between points, extrapolated at both ends from the two nearest points."""
     first_slope = (y[1] - y[0]) / (x[1] - x[0])
     last_slope = (y[-2] - y[-1]) / (x[-2] - x[-1])
     first = y[0] + first_slope * (time[0] - x[0])
@@ -271,7 +271,7 @@ def _extend_lines(time: Samples, x: Samples, y: Samples) -> Samples:
 def _measure_off_line(x: Samples, y: Samples) -> Samples:
     """Return the distance of each of n >= 3 values from the line through its two nearest neighbours."""
     index = np.arange(x.size)
-    # The first and the last value have both neighbours on one side.
+    # Both neighbours of the first and of the last value are on the same side.
     middle = np.clip(index, 1, x.size - 2)
     is_end = index != middle
     near = np.where(is_end, middle, middle - 1)
@@ -303,7 +303,7 @@ class Envelope(NamedTuple):
 
 
 def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
-    """Find the lowest decaying exponential above all peaks, fitted around their middle; None if there are no peaks.
+    """Find the lowest decaying exponential above all peaks, fitted near their middle; None if there are no peaks.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ def find_upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     t0, top0 = hull[max(right_vertex - 1, 0)]
     t1, top1 = hull[right_vertex]
     rate = (top0 - top1) / (t1 - t0) if t1 > t0 else 0.0
-    # The vibration energy never rises, so the highest peak bounds it.
+    # The vibration energy never rises, so it cannot exceed the highest peak.
     if rate <= 0:
         highest = max(top for _, top in hull)
         return Envelope(float(np.exp(highest)), 0.0, middle, floor)

@@ -213,7 +213,7 @@ FROZEN: list[tuple[str, float | tuple[float, float], dict[str, float | bool], Fr
             basis="modal",
             recommended=RoundedPair(tr=0.19485, td=0.3, residual=0.798),
             tr_half_width=4.6e-05,
-            better_pair=RoundedPair(tr=0.196797, td=0.296, residual=0.682),
+            better_pair=RoundedPair(tr=0.124237, td=0.369631, residual=0.629),
             candidates=7,
             admissible=7,
             next_tr=(0.15577, 0.103471, 0.092072),

@@ -116,7 +116,7 @@ def test_verify_warns_where_it_is_large() -> None:
     )
     assert "1.4% of its path in the flight" in message
     assert message.endswith(
-        "this holds if the parts become one rigid body, which the deck of the run shows (`deck`)"
+        "this holds if the parts become one rigid body, which the deck of the run shows (--deck)"
     )
     alone = run_json(
         "verify", "--tr", "0.0826", "--td", "0.1464", "--part", "12", locate_car()

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 # Relative error of vibration energies that are derived from spectral lines or counted oscillations [-].
 _KNOWN_WITHIN: Final = 0.1
-# Largest number of similar modes with random phases that is assumed; a computed car had 100 such modes.
+# Assumed upper bound of the number of similar modes with random phases; a computed car model had 100 such modes.
 # The total energy of m modes with random phases has a relative standard deviation of 1/sqrt(8 m).
 _MODES_OUT_OF_STEP: Final = 110
-# Largest relative excess of the mean energy after td over its prediction from spectral lines, in computed runs [-].
+# The mean energy after td may deviate from its prediction from spectral lines by at most this fraction [-].
 _OF_SOLVER: Final = 0.005
 # Smallest number of states needed to determine the fluctuation of the energy.
 _FEWEST_STATES: Final = 8
@@ -88,7 +88,7 @@ def _compute_mean_ratio(
 
 
 def _bound_vibration_energies(situation: Situation) -> list[tuple[float, float]]:
-    """Return bounds of the vibration energy at td, each as (elastic energy, total vibration energy) [energy]."""
+    """Return lower and upper bounds of the vibration energy at td, each as (elastic energy, total energy) [energy]."""
     compared = situation.vibration.compared
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
@@ -141,7 +141,7 @@ class Worth(NamedTuple):
 def compare_error_with_contact(
     situation: Situation, candidate: Candidate
 ) -> Worth | None:
-    """Compare the vibration error of a pair with the energy of the next contact; None if unknown.
+    """Compare the vibration error of a pair with the energy of the next contact; None if either is unknown.
 
     The energy of the error is R^2 U(td).  If the residual R is unknown, its largest value is used: that of equal levels
     with opposite signs.

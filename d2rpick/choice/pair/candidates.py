@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 # Largest number of candidates that are judged in one batch; larger arrays need more memory and are not faster.
 _MOST: Final = 20_000
-# Largest growth factor of the number of td judged together, from one batch to the next [-].
+# Largest growth factor of the number of td that are judged together, from one batch to the next [-].
 _MORE: Final = 8
-# Largest excess of the upper bound of a residual over the residual without a note on the candidate [-].
+# A candidate gets a note if the upper bound of its residual exceeds the residual by more than this [-].
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = "on the same swing of the energy as td, which saves hardly anything"
@@ -82,7 +82,7 @@ class Candidate(Measured, Record):
 
     @property
     def error(self) -> float:
-        """The error by which candidates are ranked [-]: the residual, or else the level error; infinite if unknown."""
+        """The error that ranks the candidates [-]: the residual if known, otherwise the level error or infinity."""
         error = self.residual if self.residual is not None else self.level_error
         return np.inf if error is None else error
 
@@ -216,7 +216,7 @@ class Judged:
 
     @property
     def error(self) -> Samples:
-        """Error by which the candidates are ranked, see `Candidate.error`, shape (n,) [-]."""
+        """Error by which the candidates are ranked (see `Candidate.error`), shape (n,) [-]."""
         residual = self.columns["residual"]
         # Candidates with a wide error band rank lower, because the smallest of many estimates is too optimistic.
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
@@ -236,7 +236,7 @@ class Judged:
 
     @property
     def near_td(self) -> NDArray[np.bool_]:
-        """True for each candidate of the model with many modes that saves little because it is close to td."""
+        """True for each candidate of the model with many modes that saves hardly anything because it is close to td."""
         starts = [_get_start_of_flight(situation) for situation in self.situations]
         flown = self.td - np.array(starts)[self.situation_of]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
@@ -253,7 +253,7 @@ class Judged:
         )
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
-        """Return the candidates in the given ``rows``, without their objections."""
+        """Return the candidates in the given ``rows``, without the objections to them."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(
             self.situations, self.situation_of[rows], self.moments.at(rows), columns, ()
@@ -493,7 +493,7 @@ def _list_remarks(
     measured: Mapping[str, Any],
     objections: Sequence[str],
 ) -> Iterator[str]:
-    """Yield the notes on a tr that do not affect whether it is acceptable, in addition to the objections."""
+    """Yield the notes on a tr, other than the objections, that do not make the tr unacceptable."""
     undescribed = situation.vibration.undescribed
     if not (measured or situation.vibration.unknown or situation.at_rest):
         why = "" if undescribed in objections else f": {undescribed}"

@@ -39,9 +39,9 @@ _USE_BEST: Final = (
     "(d2rpick verify)"
 )
 _AVOID_BEST: Final = "choose another flight, or make other parts rigid"
-# _USE_COMPARED: advice of _USE_BEST if the comparison has been made.
+# _USE_COMPARED: the advice that replaces _USE_BEST if a switched run has been compared.
 _USE_COMPARED: Final = "use this pair if only the motion matters"
-# Largest excess of the worst-case residual over the expected residual at which no worst case is shown [-].
+# The worst case is shown only if its residual exceeds the expected residual by more than this [-].
 _ALIKE: Final = 5e-3
 
 
@@ -143,7 +143,7 @@ class Decision(NamedTuple):
 
     @property
     def is_limited_by_raised_grade(self) -> bool:
-        """True if the vibration limits the verdict, although its grade was raised because its error hardly matters."""
+        """True if the vibration grade determines the verdict although it was raised because of a negligible error."""
         vibration = self.quality.vibration
         is_raised = self.quality.alone.grade != vibration.grade
         return is_raised and vibration.grade == self.grade
@@ -224,7 +224,7 @@ def decide(
     is_admissible: bool = True,
     best_residual: float | None = None,
 ) -> Decision:
-    """Decide on a tr in a situation. Any of the ``objections`` makes it inadmissible; ``better`` is a better pair.
+    """Return the verdict on a tr; any of the ``objections`` makes it inadmissible, and ``better`` is a better pair.
 
     ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
     ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
@@ -247,7 +247,7 @@ def decide(
 
 
 def _find_worst_residual(situation: Situation, candidate: Candidate) -> float:
-    """Return the largest residual that is consistent with the record [-].
+    """Return the largest residual that is consistent with the record [-]; 0 if nothing vibrates.
 
     If the direction of the deformation is unknown, it is that of equal levels with opposite signs.
     """

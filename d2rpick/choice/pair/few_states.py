@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.pair.situation import Situation
 
-# Number of extrema of the energy in each of its periods: a minimum and a maximum.
+# Number of energy extrema in each energy period: a minimum and a maximum.
 _TURNS_PER_PERIOD: Final = 2
-# Files for which LS-DYNA usually has a shorter output interval than for d3plot.
+# LS-DYNA usually writes these files at shorter intervals than d3plot.
 _OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
 
 
 def warn_about_few_states(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning if fewer than 10 states per visible period are too few to determine the energy level at td.
+    """Yield a warning if a visible period has fewer than 10 states, too few to determine the energy level at td.
 
     If no period is visible, the output may be too coarse to show any, since a d3plot has a few hundred states at most.
     """

@@ -34,32 +34,32 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
 
-# Largest excess over the smallest deformation error at which deformation errors are treated as equal [-].
+# Deformation errors that exceed the smallest one by at most this are treated as equal [-].
 EQUALLY_GOOD = 0.02
-# Largest difference at which the level errors of pairs are treated as equal [-].
+# Level errors of pairs that differ by at most this are treated as equal [-].
 # Smaller level differences do not matter, because the level predicts the mean energy after td to 10 % at best.
 LIKE_LEVELS = TOLERATED_GROWTH
-# Largest level error due to rounding at a crossing, for levels above this fraction of the highest energy [-].
+# Largest level error that rounding causes at a crossing, for levels above this fraction of the highest energy [-].
 ROUNDING: Final = 1e-3
 # Number of decimals to which errors are rounded before comparison, so that round-off does not affect the ranking.
 _DECIMALS: Final = 4
-# Largest relative difference from the longest rigid time at which rigid times are treated as equal [-].
+# Rigid times that are shorter than the longest one by at most this fraction are treated as equal [-].
 LIKE_TIMES = 0.1
 
 # Largest residual of a good pair [-], which is also the default tolerance for tr.
 MOST_GOOD = 0.2
 # Largest upper bound of the residual of a good pair [-]; the bound includes modes hidden in the misfit.
 _MOST_HIDDEN: Final = 0.3
-# Smallest deviation at which the energy is treated as above or below its mean, in standard deviations [-].
+# Smallest deviation by which the energy is treated as above or below its mean, in standard deviations [-].
 _BAND: Final = 0.25
 # The following limits of the vibration error are explained in docs/explanation/validation-vibration.md.
-# _HARDLY_GOOD: largest energy of the vibration error of a good pair, relative to the energy of the next contact [-].
-# MOST_WORTH_OF_FAIR: largest energy of the error of a fair pair, relative to the energy of the next contact [-].
+# _HARDLY_GOOD: largest vibration-error energy of a good pair, relative to the energy of the next contact [-].
+# MOST_WORTH_OF_FAIR: largest vibration-error energy of a fair pair, relative to the energy of the next contact [-].
 _HARDLY_GOOD: Final = 0.01
 MOST_WORTH_OF_FAIR: Final = 0.05
 # Smallest number of states that resolve a flight; for fewer states, a shorter output interval is proposed.
 _ENOUGH_STATES: Final = 200
-# Smallest number of states up to td at which another cure than more states is named.
+# With at least this many states up to td, a cure is proposed other than more states.
 _FEW_STATES: Final = 20
 # Largest number of parts that are named in a sentence.
 _NAMED: Final = 5
@@ -81,7 +81,7 @@ def rank_candidates(
 
 
 def rank_judged(judged: Judged) -> Iterator[Candidates]:
-    """Rank and number the candidates of each td, and recommend the first within the limits of the settings.
+    """Rank and number the candidates of each td, and recommend the first that meets the limits of the settings.
 
     Acceptable candidates come first; of these, those on the swing of td or near td come last, since they save little.
     In each group those of like quality come first, the earliest first; but among rigid times within 10 % of the
@@ -120,19 +120,19 @@ def rank_judged(judged: Judged) -> Iterator[Candidates]:
 
 
 def get_limit_of_like_quality(situation: Situation) -> float:
-    """Return the largest difference of equally good errors [-], for deformations or for energy levels."""
+    """Return the largest difference [-] at which two deformation errors, or two level errors, are treated as equal."""
     return LIKE_LEVELS if situation.vibration.unknown else EQUALLY_GOOD
 
 
 def is_good_residual(residual: Samples, highest: Samples) -> NDArray[np.bool_]:
-    """Return True for each good pair, given its residual and the upper bound of it, shape (n,) [-]; False for NaN."""
+    """Return True for each good pair, given its residual and its upper bound, both of shape (n,) [-]; False for NaN."""
     return (residual <= MOST_GOOD) & (highest <= _MOST_HIDDEN)
 
 
 def is_within_band(
     error: Samples, expected: Samples, error_of_best: Samples, best: Samples
 ) -> NDArray[np.bool_]:
-    """Return True for each pair that cannot be distinguished from the best pair within the error band of the best pair.
+    """Return True for each pair that may be as good as the best pair, given the error band of the best pair.
 
     All arguments and the result have shape (n,) [-].
     An error lies halfway from the ``expected`` residual, for the best pair ``best``, to its upper bound, in the square.
@@ -166,7 +166,7 @@ def order_by_quality(
     is_off: NDArray[np.bool_],
     room: Samples,
 ) -> NDArray[np.intp]:
-    """Return the order of the candidates, group by group; in each group, the equally good best candidates come first.
+    """Return the order of the candidates, group by group; each group starts with the best, equally good candidates.
 
     These are the good ones.  If a group has no such pair, they are those with an error within ``room``, of shape
     (groups,), of the smallest, or with an expected error that the band of the best leaves open; the other arguments
@@ -211,7 +211,7 @@ def order_by_quality(
 def _find_extremes(
     extreme: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
 ) -> Samples:
-    """Return the smallest or largest value in each group; ``extreme`` is ``np.minimum`` or ``np.maximum``."""
+    """Return the smallest value in each group if ``extreme`` is ``np.minimum``, the largest if it is ``np.maximum``."""
     extremes = np.full(groups, np.inf if extreme is np.minimum else -np.inf)
     extreme.at(extremes, group, values)
     return extremes
@@ -230,7 +230,7 @@ class Excess(NamedTuple):
 def list_exceeded_limits(
     situation: Situation, candidate: Candidate
 ) -> tuple[Excess, ...]:
-    """Return the limits in the settings that a candidate exceeds, or for which its value is unknown."""
+    """Return the limits that the settings define and that a candidate exceeds or has no value for."""
     exceeded = []
     for limit, value in situation.settings.limits:
         of_td = limit.quantity not in candidate._fields
@@ -311,7 +311,7 @@ class Grade(NamedTuple):
 
 
 def grade_residual(residual: float) -> str:
-    """Return the grade of a residual [-] alone.
+    """Grade a residual [-], ignoring all other criteria.
 
     Examples
     --------
@@ -324,7 +324,7 @@ def grade_residual(residual: float) -> str:
 
 
 class Quality(NamedTuple):
-    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse grade is used.
+    """Two grades of a pair, for the ``motion`` and for the ``vibration`` after td. The worse of the two counts.
 
     ``alone`` is the grade of the vibration by itself.  ``worth`` may raise it: the energy of the vibration error
     relative to the next contact, None if that is unknown.
@@ -337,7 +337,7 @@ class Quality(NamedTuple):
 
     @property
     def grade(self) -> str:
-        """The worse of the grades of the motion and of the vibration."""
+        """The worse of two grades: that of the motion and that of the vibration."""
         return min((self.motion.grade, self.vibration.grade), key=GRADES.index)
 
     @property
@@ -423,7 +423,7 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
 def _list_causes_for_poor(
     situation: Situation, best: Candidate, best_residual: float | None
 ) -> list[Cause]:
-    """Return the causes for which the vibration is graded "poor"."""
+    """Return the causes of the vibration grade "poor"."""
     causes = []
     if best.residual is None:
         if list_times_outside_flight(situation, best.tr):
@@ -601,7 +601,7 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
-    """Return the causes for which the vibration is graded "fair"."""
+    """Return the causes of the vibration grade "fair"."""
     if best.residual is None:
         return []
     high = best.residual_high or best.residual
@@ -637,7 +637,7 @@ def _list_causes_for_fair(situation: Situation, best: Candidate) -> list[Cause]:
 
 
 def count_states_per_period(energy: Samples) -> float | None:
-    """Return the average number of states per energy period (two crossings of the mean); None if there is no period.
+    """Return the average number of states per energy period; None if the energy does not complete a period.
 
     Examples
     --------

@@ -45,11 +45,11 @@ if TYPE_CHECKING:
     Look = Callable[[float], "Situation"]
 
 
-# Largest error of the energies that a solver writes, as a fraction of the highest energy [-].
+# Assumed upper bound of the error in energies from the solver, as a fraction of the highest energy [-].
 _SOLVER_ERROR: Final = 1e-5
-# Largest fluctuation treated as no vibration, as a fraction of the largest vibration energy after the load [-].
+# Largest energy fluctuation that is ignored, as a fraction of the largest vibration energy after the load [-].
 _FAINT: Final = 1e-4
-# Smallest fraction of the record that an oscillator must describe for no modes to be fitted [-].
+# No modes are fitted if an oscillator describes at least this fraction of the record [-].
 _MOST_OF_RECORD: Final = 0.5
 # Rounding error of a printed energy, in units of its last digit [-].
 # Two units are assumed, because a constant energy may alternate between two printed values.
@@ -70,7 +70,7 @@ def is_at_rest(
     start, end = flight
     last = td if end is None else max(td, end - LEAST_MARGIN * (end - start))
     _, inside = history.between(start, last)
-    # With so few samples, a vibration cannot be seen.
+    # So few samples cannot show a vibration.
     if inside.size < MIN_SAMPLES_PER_PERIOD:
         return False
     # The rounding error is 0 if no energy is written at all.
@@ -175,7 +175,7 @@ class Situation:
 
     @property
     def earliest_tr(self) -> float | None:
-        """Earliest acceptable tr: start of the flight plus the margin [time]; None if the start is unknown."""
+        """Earliest acceptable tr: the start of the flight plus the margin [time]; None if the start is unknown."""
         start = self.flight.start
         if start is None:
             return None
@@ -201,7 +201,7 @@ class Situation:
 
     @cached_property
     def expected_margin(self) -> Margin:
-        """Margin for a td chosen by the program: the given margin, or how much earlier the contact may come."""
+        """Margin for a td chosen by the program: the given margin, or how much earlier the contact may occur."""
         return find_margin(self.history, self.flight, self.settings)
 
     @cached_property
@@ -231,7 +231,7 @@ class Situation:
 
     @property
     def most_error(self) -> float:
-        """Largest error of an acceptable tr [-]: the tolerance or, for many modes, the limit of their model."""
+        """Largest acceptable error of a tr [-]: the tolerance or, if there are many modes, the limit of their model."""
         limit = self.vibration.most_lock_in
         return self.settings.tolerance if limit is None else limit
 
@@ -244,7 +244,7 @@ class Situation:
         )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or else the samples."""
+        """Return the times of the energy peaks in (start, end], ascending, from the oscillator or the samples."""
         return describe_energy_at(self.history, self.td, self.evidence).peaks(
             start, end
         )
@@ -257,7 +257,7 @@ class Situation:
         )
 
     def at(self, td: float) -> Situation:
-        """Return the situation of the same record, flight and evidence at another ``td``."""
+        """Return the situation at another ``td`` with the same record, flight and evidence."""
         return self if td == self.td else replace(self, td=td)
 
 
@@ -268,7 +268,7 @@ def examine_td(
     *,
     quick: bool = False,
 ) -> Situation:
-    """Find the flight around ``td`` and the vibration in it; results that many td share are computed once per history.
+    """Find the flight around ``td`` and its vibration; results that many td share are computed once per history.
 
     Use ``quick`` for a choice among many td: an oscillator that describes most of the record, including td, is not
     searched for again, and the misfit of a refused oscillator is not computed.
@@ -296,7 +296,7 @@ def examine_td(
     quiet: QuietTime | None = None
     is_given = settings.oscillator is not None or settings.fit_window is not None
     if not (is_shown or _covers_most(history, described) or (described and is_given)):
-        # The quiet time is needed if the energy is the only evidence of a flight, or no fit covers most of the record.
+        # The quiet time is needed if only the energy shows a flight, or if no fit covers most of the record.
         quiet = find_quiet_time(history, td)
         if settings.replay:
             # Imported here to keep start-up fast.
@@ -362,7 +362,7 @@ def _find_other_models(situation: Situation) -> dict[str, SignedModel]:
         # Imported here to keep start-up fast.
         from d2rpick.vibration.modal_span import get_inner_window
 
-        # The energy shows a slightly different flight for each td, so modes are fitted in windows that many td share.
+        # The energy shows a slightly different flight for each td, so modes are fitted in windows shared by many td.
         inner = get_inner_window(history, in_flight)
         in_flight = inner if inner.start < situation.td <= inner.end else in_flight
     return find_models(history, in_flight, settled, together=situation.together)
@@ -393,21 +393,21 @@ def _limit_start(situation: Situation, since: float) -> Situation:
 
 
 def _get_bounds(history: History, seen: Seen) -> Span:
-    """Return the bounds of the flight according to the evidence, or else those of the whole record [time]."""
+    """Return the bounds of the flight according to the evidence; without evidence, those of the whole record [time]."""
     if seen.flight:
         return Span(seen.flight.start, seen.flight.end)
     return Span(history.start, history.end)
 
 
 def _get_quiet_window(history: History, quiet: QuietTime | None) -> Span | None:
-    """Return the window in which the energy shows no load, up to the end of the record if there is no contact."""
+    """Return the window in which the energy shows no load; without a contact, it lasts until the end of the record."""
     if quiet is None:
         return None
     return Span(quiet.start, history.end if quiet.end is None else quiet.end)
 
 
 def _covers_most(history: History, described: Described | None) -> bool:
-    """Return True if a window covers so much of the record that no modes need to be fitted."""
+    """Return True if a window covers enough of the record that no modes need to be fitted."""
     if described is None:
         return False
     record = float(history.time[-1] - history.time[0])

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
-# Smallest number of states per energy period at which modes of higher frequency can be detected.
+# Modes of higher frequency can be detected only with at least this number of states per energy period.
 _FEW_STATES = 4
 # Kinetic fraction at td above which every tr loses more than half of the vibration energy [-].
 POOR_KINETIC_SHARE = 0.5
@@ -45,11 +45,11 @@ POOR_RESIDUAL = 0.5
 # Largest plastic energy without a warning, as a fraction of the vibration energy [-]; it may be a preload.
 _NOTABLE_PLASTIC = 0.05
 
-# Assumed ratio of the static to the lowest energy in flight [-], below 1 because modes rarely vanish at once.
+# Assumed ratio of the static energy to the lowest energy in flight [-]; modes rarely all have zero energy at once.
 # With _AT_REST = 0.85, the predicted mean energies after td had errors of up to 0.03 in 12 switched runs of a car.
 # With _AT_REST = 0.85, the predicted mean energies of a shell box had errors of -0.05 to 0.16.
 _AT_REST = 0.85
-# Largest expected mean energy after td relative to the reference run [-]; 1 is exceeded, as estimates are inexact.
+# Largest expected mean energy after td relative to the reference run [-]; above 1 because estimates are inexact.
 # Switching adds no energy, so a ratio above MOST_KEPT indicates a contact in the flight.
 MOST_KEPT = 1.2
 # Largest argument for which the exponential function does not overflow [-].
@@ -158,7 +158,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
         text = "no end of the load is found in the record"
         is_given = situation.settings.after is not None or flight.refusal
         yield Caution("no-flight", text if is_given else f"{text}; give it as `after`")
-    # If the situation has a refusal, the refusal already contains this message.
+    # If the flight is refused, the reason for the refusal already contains this warning.
     elif td <= earliest and not flight.refusal:
         yield Caution(
             "td-in-load",
@@ -174,7 +174,7 @@ def _warn_about_flight(situation: Situation) -> Iterator[Caution]:
 
 
 def _warn_about_grazing(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning with the earliest contact time, if the body only grazes in the contact that ends the flight."""
+    """Yield a warning with the earliest contact time if the body only grazes in the contact that ends the flight."""
     flight = situation.flight
     margin = situation.expected_margin
     if flight.end is None or flight.refusal or margin.source != "grazing":
@@ -204,7 +204,7 @@ def _warn_about_unknown_rotation(situation: Situation) -> Iterator[Caution]:
 
 
 def _describe_early_contact(situation: Situation) -> str:
-    """Describe how much earlier the contact may come, and the last safe td."""
+    """Describe how much earlier the contact may occur, and the last safe td."""
     start, end = situation.flight.within(situation.history.time)
     early = min(situation.expected_margin.time, end - start)
     if early < end - start:
@@ -215,7 +215,7 @@ def _describe_early_contact(situation: Situation) -> str:
 
 
 def _warn_about_evidence(situation: Situation) -> Iterator[Caution]:
-    """Yield a warning, with advice, if a flight is uncertain although other data than the part energies show it."""
+    """Yield a warning with advice if a flight is uncertain although data other than the part energies show it."""
     flight = situation.flight
     if flight.start is None or flight.source in ("energy", "given") or flight.certain:
         return
@@ -282,7 +282,7 @@ def warn_about_place(situation: Situation, tr: float) -> Iterator[Caution]:
 
 
 def _describe_moving_apart(parts: Sequence[Part]) -> str:
-    """Describe the parts that move away from the others without being connected to them."""
+    """Describe the parts that move away from the others because they are not connected to them."""
     verb = "flies" if len(parts) == 1 else "fly"
     away = (
         f"{list_names([part.name for part in parts])} {verb} away from the other parts"
@@ -384,17 +384,17 @@ class Means(NamedTuple):
     mean_after: float
 
     def ratio(self, locked: float) -> float:
-        """Return the mean energy after td relative to the reference run [-], if ``locked`` is locked in [energy]."""
+        """Return the mean energy after td relative to the reference run [-], if ``locked`` [energy] is locked in."""
         return (self.resting + (locked - self.resting) / 2) / self.mean_after
 
     @property
     def largest_locked_in(self) -> float:
-        """Largest locked-in energy at which the energy after td does not exceed that of the reference run [energy]."""
+        """Largest locked-in energy for which the energy after td is no higher than in the reference run [energy]."""
         return self.resting + 2 * (MOST_KEPT * self.mean_after - self.resting)
 
 
 def compute_means(situation: Situation) -> Means | None:
-    """Compute the energies of the flight; None if the basis is not "energy", or nothing flies or vibrates."""
+    """Compute the energies of the flight; None if the basis is not "energy", or if nothing flies or vibrates."""
     if situation.basis != "energy":
         return None
     mean = compute_mean_in_flight(situation)
@@ -473,7 +473,7 @@ def compute_shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """An objection to all candidates for which ``holds``, shape (n,), is True.
+    """An objection that applies to each candidate for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
     this module with some of its arguments.  ``is_of_error``: it only says that an error is too large, as the residual
@@ -636,7 +636,7 @@ def _tell_keeps_nothing(
     residual: Samples,
     candidate: int,
 ) -> list[str]:
-    """Return the objection that a candidate is worse than having no vibration after td."""
+    """Return the objection that a candidate's residual exceeds that of a release without any vibration."""
     return [
         _describe_keeps_nothing(
             situations[situation_of[candidate]], residual[candidate]
@@ -662,7 +662,7 @@ def _describe_in_load(situation: Situation) -> str:
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
-    """State that a pair is worse than having no vibration after td, or than the best pair at this td."""
+    """State that the residual of a pair exceeds that of a release without vibration, or the smallest one at this td."""
     smallest = situation.vibration.least_residual or 0.0
     better = f"{NOTHING_KEPT:g}, the residual of a release without any vibration"
     if situation.vibration.keeps_nothing:
@@ -671,7 +671,7 @@ def _describe_keeps_nothing(situation: Situation, residual: float) -> str:
 
 
 def _describe_above_reference(means: Means | None, energy: float) -> Iterator[str]:
-    """State the factor by which the mean energy after td would exceed that of the reference run."""
+    """State the ratio of the mean energy expected after td to that of the reference run."""
     if means:
         times = format_beyond_limit(means.ratio(energy), MOST_KEPT)
         text = f"the mean energy after td is expected to be {times} times that of the reference run"

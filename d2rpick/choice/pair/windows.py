@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.histories.history import Samples
 
-    # A function that tests times, and returns True for each time that passes the test.
+    # A function that tests times and returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Largest number of halvings of a sampling interval, with which the end of a window is found to 1e-6 of the interval.
+# Largest number of halvings of a sampling interval; they locate the end of a window to 1e-6 of the interval.
 _HALVINGS: Final = 20
-# Relative margin by which a level lies below the highest energy, so that rounding does not hide the crossing [-].
+# A level lies below the highest energy by this fraction, so that rounding does not hide the crossing [-].
 _BELOW: Final = 1e-12
 
-# Largest deviation of the error from its polyline [-]; this is half a unit of the last printed digit.
+# Largest deviation of the error from its polyline [-], which is half a unit of the last printed digit.
 _EXACT: Final = 5e-4
 
 
@@ -73,7 +73,7 @@ def find_acceptable_windows(
 
 
 def cut_before_td(situation: Situation, windows: Samples) -> Samples:
-    """Cut off the windows one output interval before td, because a later tr saves nothing."""
+    """Truncate the windows one output interval before td, because a later tr saves nothing."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -118,7 +118,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count, for each time, the runs that have the time in one of their windows.
+    """Count, for each time, the runs with a window that contains the time.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def count_coverage(
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # Windows have no gap between them if one starts at the time at which another ends.
+    # There is no gap between two windows if one starts at the time at which the other ends.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching

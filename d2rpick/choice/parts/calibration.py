@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import Samples
 
-# Relative error of CPU times (5 %) divided by the relative error of the assumed weight ratios (50 %) [-].
+# Ratio of the assumed relative error of CPU times (5 %) to that of the assumed weight ratios (50 %) [-].
 _DOUBT: Final = 0.1
-# Smallest contribution of the restart segments to a weight at which they determine the weight [-].
+# Restart segments determine a weight if they contribute at least this fraction of its value [-].
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -133,7 +133,7 @@ def fit_weights(observations: Sequence[Observation]) -> FittedWeights:
 def _make_start_values(
     deformable: Sequence[Observation], classes: Sequence[str]
 ) -> Samples:
-    """Return start values: weights scaled to these runs, remaining cost per node, and cost per rigid-body node."""
+    """Return starting values: weights scaled to these runs, remaining cost per node, and cost per rigid-body node."""
     measured = [
         sum(MEASURED[name] * observation.counts.get(name, 0.0) for name in classes)
         for observation in deformable
@@ -349,7 +349,7 @@ def _read_termination_time(deck: Deck) -> float:
 def _make_observation(
     timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
 ) -> Observation:
-    """Return the observation of a restart segment, in which each part was rigid for its fraction ``lasting`` [-]."""
+    """Return the observation of a restart segment; each part is rigid for its fraction ``lasting`` of the segment."""
     counts, nodes = _count_computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
@@ -386,7 +386,7 @@ def _make_zone_observations(
 def _count_computed(
     inventory: Inventory, lasting: Mapping[int, float]
 ) -> tuple[dict[str, float], float]:
-    """Return the average numbers of deformable elements and integration points by class, and of rigid-body nodes."""
+    """Return the average numbers of deformable elements, integration points (both by class) and rigid-body nodes."""
     always = inventory.rigid_parts
     computed: dict[str, float] = {}
     _add_counts(
@@ -419,7 +419,7 @@ def _add_counts(
     counts: Mapping[int, Mapping[str, int]],
     times: float,
 ) -> None:
-    """Add the numbers of elements of known cost to the counts by class, multiplied by the factor ``times``."""
+    """Add the numbers of elements of known cost to the counts by class, each multiplied by ``times``."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():
             cost = inventory.formulation(part, kind).cost

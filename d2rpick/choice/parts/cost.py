@@ -27,14 +27,14 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
 
-# Cost of an element per cycle [us]; a shell costs "point" more for each integration point after the first.
+# Cost of an element per cycle [us]; a shell costs "point" more for every integration point after the first.
 # The element costs were fitted to OpenRadioss runs of a car with 1516 elements (docs/reference/cost-model.md).
 # The costs of beams and springs are less accurate than the costs of other elements.
 POINT: Final = "point"
 MEASURED: Final[Mapping[str, float]] = {
     "QBAT": 0.58, "QEPH": 0.36, "BT": 0.21, "beam": 0.30, "solid": 1.3, "spring": 0.3, POINT: 0.11,
 }  # fmt: skip
-# Fraction of the cost of a deformable step that is due to elements, with their assembly, contact and output [-].
+# Fraction of the cost of a deformable step that is due to elements, including assembly, contact and output [-].
 ELEMENT_SHARE: Final = 0.91
 # Cost per rigid-body node and cycle [us], fitted to the same runs as the element costs.
 RIGID_NODE: Final = 0.04
@@ -124,7 +124,7 @@ class Share(NamedTuple):
 
 
 class ByDeck(NamedTuple):
-    """Sources of values from a deck: its files, and the weights (None if the user gave the cost fraction)."""
+    """Sources of the values taken from a deck: its files, and the weights (None if the user gave the cost fraction)."""
 
     files: tuple[SourceFile, ...]
     weights: Weights | None
@@ -174,7 +174,7 @@ class CostModel:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Formulations in the deck that have no weight, for which the weight of a similar formulation is assumed."""
+        """Formulations in the deck that have no weight and are assumed to cost as much as a similar formulation."""
         names: dict[str, None] = {}
         for part, counts in self.inventory.counts.items():
             if part in self._rigid:
@@ -225,7 +225,7 @@ class CostModel:
 
 
 def _sum_amounts(amounts: Iterable[Amount]) -> Amount:
-    """Return the sum of costs, with all formulations that have no weight."""
+    """Return the total cost, and the formulations that it omits because they have no weight."""
     cost = 0.0
     unknown = list[str]()
     for amount in amounts:

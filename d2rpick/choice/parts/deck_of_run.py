@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def find_rigid_bodies(
     inventory: Inventory, parts: Collection[int]
 ) -> tuple[RigidBody, ...]:
-    """Return the rigid bodies that ``parts`` become; empty if their elements, or ties between bodies, are unknown.
+    """Return the rigid bodies that ``parts`` become; empty if their elements, or the ties between them, are unknown.
 
     In LS-DYNA, which switches parts, disconnected pieces of one part become one rigid body.  In Radioss, whose rigid
     bodies are sets of nodes, each piece may have a body of its own.
@@ -95,12 +95,12 @@ def check_model_of_deck(run: OpenedRun, inventory: Inventory) -> Caution | None:
 
 
 def _has_energy(run: OpenedRun, parts: Sequence[Part]) -> bool:
-    """Return True if the history contains an energy of any of the parts that is not always zero."""
+    """Return True if any of the parts has an energy in the history that is not always zero."""
     return bool(parts) and bool(give_if_written(lambda: run.part_energies(parts).any()))
 
 
 def warn_about_titles(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Yield a warning if the titles of parts differ between deck and history."""
+    """Yield a warning if part titles differ between deck and history."""
     differing = [
         part
         for part in parts

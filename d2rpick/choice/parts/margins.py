@@ -52,7 +52,7 @@ def _compute_drift(
 
 
 def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
-    """Return the given margin, or the time by which a switch in the flight may make the contact earlier."""
+    """Return the given margin or, by default, the time by which a switch in the flight may advance the contact."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return compute_margin(history, flight, settings.margin)
     history, flight = restore_parts(history, flight)
@@ -75,7 +75,7 @@ def find_margin(history: History, flight: Flight, settings: Settings) -> Margin:
 def _judge_rotation(
     history: History, flight: Flight, margin: Margin, position_error: float | None
 ) -> str | None:
-    """Return how an unknown rotation of the bodies affects a ``margin``, see `Margin`."""
+    """Return how an unknown rotation of the bodies affects a ``margin`` (see `Margin`)."""
     from d2rpick.flight.turning_bound import may_turn_back
 
     if margin.time > compute_margin(history, flight, place=position_error).time:

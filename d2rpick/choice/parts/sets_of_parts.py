@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import OpenedRun
 
-# Largest difference of savings that are treated as equal [-]; the cost model has errors of a few percent.
+# Savings that differ by at most this are treated as equal [-], because the cost model has errors of a few percent.
 _LIKE: Final = 0.01
 # Smallest fraction of the mass of all switchable parts that the set "heavy" contains [-].
 _HEAVY: Final = 0.5
@@ -188,7 +188,7 @@ def compare_sets_of_parts(
             )
         else:
             still_parts = ()
-        # Parts that are at rest relative to the body may fly longer than parts that move relative to it.
+        # Parts at rest relative to the body may fly longer than parts that move relative to it.
         if still_parts and sets[-1].moving:
             sets.append(comparison.of(PartSet(_STILL, still_parts), times))
     recommended_sets = tuple(_mark_recommended(_drop_repeated_sets(sets)))
@@ -306,7 +306,7 @@ class _SetComparison:
         return Placement(self.model.inventory) if self.model else None
 
     def of(self, part_set: PartSet, times: Times | float | None) -> PartSet:
-        """Complete a set with its costs and errors, for a given (tr, td) or td, or else for the best td of the set."""
+        """Complete a set with its costs and errors, for a given (tr, td) or td (default: the best td of the set)."""
         reasons = list[str | None]()
         if self.model:
             share = self.model.saved(part_set.parts)

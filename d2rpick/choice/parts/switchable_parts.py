@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest standard deviation of the energy in flight of a part that no longer deforms, relative to the mean [-].
+# A part no longer deforms if its energy in flight has at most this standard deviation, relative to the mean [-].
 STOPPED: Final = 0.1
 # Duration of the first phase of a landing, as a fraction of the preceding flight [-].
 _LANDING: Final = 0.05
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
-# LANDING_ALONE: smallest fraction of the energy at the start of the landing that a bumper or skid absorbs [-].
-# _CHEAP: largest fraction of the cost of all elements that a bumper or skid may have to stay deformable [-].
+# LANDING_ALONE: a bumper or skid absorbs at least this fraction of the energy at the start of the landing [-].
+# _CHEAP: largest fraction of the total element cost that a bumper or skid may have and still stay deformable [-].
 LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
@@ -110,7 +110,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
     masses = _read_masses(run)
     try:
         history, members = _read_energy_of_flight(run)
-    except FormatError as error:  # The error means that no part ever deforms.
+    except FormatError as error:  # The error is raised if no part ever deforms.
         still = {
             part.id: PartFacts(part, masses.get(part.id), has_energy=False)
             for part in run.parts
@@ -143,7 +143,7 @@ def collect_facts(run: OpenedRun, settings: Settings) -> RunFacts:
 
 
 def _read_energy_of_flight(run: OpenedRun) -> tuple[History, Sequence[Part] | None]:
-    """Return the energy of the parts that fly together, or of all deformable parts, and the flying parts."""
+    """Return the energy of the parts that fly together (all deformable parts if none fly), and the flying parts."""
     members = give_if_written(lambda: find_parts_flying_together(run))
     chosen = members or list_deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
@@ -237,7 +237,7 @@ def judge_parts(
     model: CostModel | None,
     printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
-    """Judge whether each part of a deck or history can be switched; the rows are sorted by part id.
+    """Judge whether each part of a deck or history can be switched; the result is sorted by part id.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def _describe_part(
     by_deck: tuple[float | None, float | None],
     printed: Mapping[int, tuple[float, str]],
 ) -> PartRow:
-    """Collect the data of a part; ``by_deck`` contains its mass and its time step according to the deck."""
+    """Collect the data of a part; ``by_deck`` contains the mass and the time step that its deck defines."""
     fact = facts.parts.get(part)
     inventory = model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
@@ -314,7 +314,7 @@ def _describe_part(
 
 
 def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
-    """Return the kind of a part: "spring" or "particles" according to its elements, or else its material's kind."""
+    """Return the type of a part: "spring" or "particles" according to its elements, otherwise its material type."""
     if data is None:
         return None
     if counts and set(counts) <= DISCRETE:
@@ -327,7 +327,7 @@ def _find_kind(data: PartData | None, counts: Mapping[str, int] | None) -> str |
 def _judge_part(
     row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
 ) -> PartRow:
-    """Return the row of a part with verdict and reasons; only the part ``alone`` absorbs energy at the landing."""
+    """Return the row of a part with its verdict and reasons; only the part ``alone`` absorbs the landing energy."""
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     reasons_to_keep = tuple(_list_reasons_to_keep(row, fact, data, alone)) or tuple(

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
-# Status of a run. A run with one of the first two values was judged.
+# Status of a run; runs with one of the first two values were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
     "ok",
     "none",
@@ -188,7 +188,7 @@ class StudyOfRuns:
 
     @property
     def grade(self) -> str | None:
-        """Grade of the common tr: the worst grade of any run's pair or of its error at this tr; None if unknown."""
+        """Grade of the common tr, the worst grade of any run's pair or of its error at this tr; None if unknown."""
         if self.common.tr is None:
             return None
         grades = [row.quality for row in self.runs if row.quality]
@@ -344,7 +344,7 @@ def compare_rows(
 
 
 def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
-    """Return the tr of all runs, and the interval within the accuracy of every tr (empty if low > high)."""
+    """Return the tr of all runs, and the interval that lies within the accuracy of every tr (empty if low > high)."""
     chosen = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
     low = max((bound for _, bound, _ in chosen if bound is not None), default=np.inf)
     high = min((bound for _, _, bound in chosen if bound is not None), default=-np.inf)
@@ -352,7 +352,7 @@ def _find_common_interval(rows: Sequence[StudyRow]) -> tuple[list[float], float,
 
 
 def find_cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
-    """Return the runs that were cut off: their files end within a state, or their records are shorter than most."""
+    """Return the runs that were cut off: their files end within a state, or their records are unusually short."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
     return [
@@ -387,7 +387,7 @@ def find_repeated_runs(rows: Sequence[StudyRow]) -> tuple[list[StudyRow], ...]:
 
 
 def _digest_files(row: StudyRow) -> tuple[bytes, ...]:
-    """Return a digest of each file of a run, or of the file name if the file can no longer be read."""
+    """Return a digest of each file of a run, or of the file's name if the file can no longer be read."""
     digests = []
     for stamp in row.files:
         try:
@@ -520,7 +520,7 @@ def _find_least_loss(
 
 
 def find_fewest_digits(low: float, high: float) -> float:
-    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to their middle.
+    """Return the number between ``low`` and ``high`` with the fewest digits: 0, or the number nearest to the mean.
 
     Examples
     --------

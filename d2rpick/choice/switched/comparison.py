@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import OpenedRun
 
 
-# Largest relative difference of the energies before the switch in two runs of the same model [-].
+# Two runs are of the same model if their energies before the switch differ by at most this fraction [-].
 _OF_ANOTHER_MODEL: Final = 0.2
-# Fraction of the record in which no run is switched yet, if the time of the switch is unknown [-].
+# Fraction of the record in which runs are assumed to be deformable if the time of the switch is unknown [-].
 _EARLY: Final = 0.1
-# Largest relative deviation of the momentum after td at which the motions of both runs are treated as equal [-].
+# The motions of both runs are treated as equal if the momenta after td differ by at most this fraction [-].
 MOST_MOMENTUM_ERROR = 0.05
 # Smallest divisor of deviations, as a fraction of the largest momentum [-], because a body may be at rest.
 _AT_REST = 0.01
-# Largest relative difference of the energy reported while rigid from the energy at td without a note [-].
+# A note is issued if the energy reported while rigid differs from the energy at td by more than this fraction [-].
 # The reported energy can differ, because some solvers report a wrong energy for rigid solid elements.
 _REPORTED_OFF = 0.01
 # _STILL: largest change of an energy that is treated as constant, relative to the energy [-].
-# _STILL_OF_VIBRATION: largest change of a constant energy, relative to the vibration energy [-].
+# _STILL_OF_VIBRATION: largest change of an energy treated as constant, relative to the vibration energy [-].
 _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # Relative tolerance for the energy near tr [-], because the solver may switch a state or two after the output.
 _ABOUT = 0.05
@@ -48,7 +48,7 @@ _BETWEEN: Final = 101
 
 
 class Comparison(NamedTuple):
-    """Measures of the difference between a switched run and its reference run; unknown quantities are None.
+    """Differences between a switched run and its reference run; unknown quantities are None.
 
     The fields except ``min_mean``, the smallest expected ratio of the means [-], are the keys of the JSON output.
 
@@ -126,7 +126,7 @@ def compare_with_reference(
 
 
 def _read_momentum(run: OpenedRun, parts: Sequence[Part] | None) -> Track | None:
-    """Return the momentum of some parts; None if the run lacks one of these parts or its momentum."""
+    """Return the momentum of the given parts; None if the run lacks one of these parts or its momentum."""
     missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
     return None if missing else run.momentum(parts)
 
@@ -332,7 +332,7 @@ def _check_rigid_window(
 def check_same_model(
     reference: History, switched: History, end: float
 ) -> Iterator[str]:
-    """Yield an objection if the energies of two runs differ before ``end``, where both are deformable [time]."""
+    """Yield an objection if the energies of two runs differ before ``end`` [time], while both are deformable."""
     start = max(reference.start, switched.start)
     time, energy = reference.between(start, min(end, switched.end))
     largest = float(np.abs(energy).max(initial=0.0))
@@ -349,9 +349,9 @@ def check_same_model(
 def _check_locked_in_energy(
     reference: History, tr: float, frozen: float, energy_td: float, tolerance: float
 ) -> Iterator[str]:
-    """Yield objections if the energy at td differs from that of the reference run near tr, or at td."""
+    """Yield objections if the energy at td differs from that of the reference run, either near tr or at td."""
     if max(frozen, energy_td) <= round_off(reference):
-        return  # Relative to the vibration energy, an error has no meaning if nothing vibrates.
+        return  # An error relative to the vibration energy has no meaning if nothing vibrates.
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:

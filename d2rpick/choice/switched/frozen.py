@@ -1,4 +1,4 @@
-"""Recognise a switched run by its energy alone: the energy is frozen while the parts are rigid.
+"""Recognise a switched run by its energy alone, which is constant while the parts are rigid.
 
 At the release nothing vibrates, so all vibration energy is strain energy, and the internal energy can only fall.  This
 distinguishes a rigid window from a flight in which nothing vibrates: the contact that ends such a flight adds energy.
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 # Smallest number of consecutive states without kinetic energy, or of constant energy, that show a rigid part.
 FEWEST: Final = 12
-# Smallest change of a vibrating energy, in multiples of the change up to which an energy is constant [-].
+# A vibrating energy changes by at least this multiple of the limit for a constant energy [-].
 _MUCH: Final = 100.0
 
 
 @remember
 def find_frozen_times(history: History) -> tuple[Times, ...]:
-    """Return the windows in which the energy suddenly becomes constant, up to a fall [time]."""
+    """Return the windows in which a vibrating energy is constant until it falls [time]."""
     energy = history.energy
     limits = np.maximum(
         LAST_DIGIT * np.abs(energy), history.energy_precision.quanta(energy)
@@ -44,7 +44,7 @@ def find_frozen_times(history: History) -> tuple[Times, ...]:
 
 
 def _is_frozen(energy: Samples, stretch: slice, limit: float, rounding: float) -> bool:
-    """Return True if the energy vibrates directly before a stretch of constant energy, and falls directly after it."""
+    """Return True if the energy vibrates just before an interval of constant energy, and falls just after it."""
     level = float(energy[stretch.start])
     smallest = max(_MUCH * limit, rounding)
     if level <= smallest:

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 Times = tuple[float, float]
 # Sources that determine the start of a flight to within a few states, unlike the energy alone.
 _SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
-# Largest momentum of parts that are treated as not moving, as a fraction of the momentum of the model [-].
+# Parts are treated as not moving if their momentum is at most this fraction of the model's momentum [-].
 _HARDLY: Final = 0.1
-# Largest number of output intervals after tr at which a flight that seems to begin may have begun before tr.
+# A flight that seems to begin at most this many output intervals after tr may have begun before tr.
 _SAME_STATES: Final = 3
 
 
@@ -63,7 +63,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def landed_rigid(self) -> bool:
-        """True if the contact that ends the flight came while the parts were rigid."""
+        """True if the contact that ends the flight occurred while the parts were rigid."""
         return self.landing is not None and self.landing < self.td
 
     @property
@@ -93,7 +93,7 @@ class DoneWindow(NamedTuple):
 
     @property
     def description(self) -> str:
-        """A sentence for the user about the outcome of the window."""
+        """Description of the outcome of the window for the user, in one sentence."""
         if self.flight is None:
             return "no flight is found there"
         if self.took_off is not None:
@@ -293,7 +293,7 @@ def _warn_about_deforming(
 
 
 class _AbsentWindow(NamedTuple):
-    """A window in which the ``rigid`` parts have no energies [time]; ``whole`` is True if no other part deforms."""
+    """A window [time] in which the ``rigid`` parts have no energies; ``whole`` is True if no other part deforms."""
 
     start: float
     end: float
@@ -302,7 +302,7 @@ class _AbsentWindow(NamedTuple):
 
     @property
     def caution(self) -> Caution:
-        """Warning about the rigid parts of the window."""
+        """Warning that names the parts that were rigid during the window."""
         when = f"from {self.start:.6g} to {self.end:.6g}"
         if self.whole:
             window_text = f"the parts were rigid {when}, within one output interval; the window is treated as done"
@@ -350,7 +350,7 @@ def _find_frozen_windows(history: History) -> Iterator[_AbsentWindow]:
 def _select_deformable(
     reference: Reference, among: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Return the chosen parts, or else all parts, that have internal energy; only those ``among`` the given, if any."""
+    """Return the chosen parts (by default all) that have internal energy; ``among`` restricts the choice."""
     run, history = reference
     ids = {part.id for part in run.parts if among is None} | {
         part.id for part in among or ()

@@ -1,4 +1,4 @@
-"""Find the flights of a record, in which td may lie."""
+"""Find the flights of a record, each of which may contain td."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Times at which the search for a vibration without contact starts, as fractions of the record [-].
+# Times at which the search for a contact-free vibration starts, as fractions of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
-# Shortest useful rigid window, as a fraction of the record [-]; shorter ones save less than a restart costs.
+# Shortest useful rigid window, as a fraction of the record [-]; a shorter window saves less than a restart costs.
 MIN_RIGID: Final = 0.05
 _NO_FLIGHT: Final = "no flight is found in the record, so no td can be chosen"
 
@@ -70,12 +70,12 @@ def find_longest_flight(
 
 
 def compute_last_td(end: float, margin: float) -> float:
-    """Return the last td that keeps ``margin`` before the end of a flight after rounding to printed digits [time]."""
+    """Return the last td that is at least ``margin`` before the end of a flight after rounding for print [time]."""
     return round_down_as_read(sum_times_as_read(end, -margin)) if margin else end
 
 
 def find_flights(history: History, settings: Settings) -> tuple[Flight, ...]:
-    """Find all flights of a record in time order; a flight that ends with a given landing ends at that time.
+    """Find all flights of a record in time order; a flight ends at the given landing if there is one.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _find_last_before(landing: float, flights: Iterable[Flight]) -> Flight | Non
 def _find_flights_without_landing(
     history: History, settings: Settings
 ) -> tuple[Flight, ...]:
-    """Find the flights from forces, momenta and energies, else from an oscillator or modes, else from quiet times."""
+    """Find the flights from forces, momenta and energies; failing that, from an oscillator or modes, or quiet times."""
     witnessed = find_all_seen(history)
     if witnessed:
         return tuple(
@@ -219,7 +219,7 @@ def _find_flights_without_landing(
 
 
 def list_momentum_columns(history: History) -> dict[str, Samples]:
-    """Return the columns of the momentum that shows the flight, and of the mass, keyed by name.
+    """Return the momentum columns that show the flight, and the mass column, keyed by name.
 
     They belong to the parts that fly longest, or to the chosen parts.  If only the velocity of the model is known, they
     are columns of the velocity.  The result is empty if neither is written at the times of the energy.

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
-# Smallest length ratio of a later window to an earlier window at which the earlier window is left out [-].
+# An earlier window is left out if a later window is longer than this multiple of its length [-].
 # If a window of length w and a later window of length W are used, two successive runs are rigid for w and w + W.
 # If only the later window of length W is used, both runs are rigid for W, which is more in total if W > 2 w.
 _LONGER: Final = 2.0
@@ -152,7 +152,7 @@ class RunPlan:
 
     @property
     def next_run(self) -> tuple[Times, ...]:
-        """Pairs (tr, td) of all windows of the next run, used before or supported [time]; empty if no window is new.
+        """Pairs (tr, td) of all windows of the next run, both used and supported [time]; empty if no window is new.
 
         The next run starts again from the beginning, so it needs both kinds.
         """
@@ -170,7 +170,7 @@ class RunPlan:
 
     @property
     def run_time_share(self) -> float | None:
-        """Expected run time with the windows relative to the reference run [-]; None if the cost share is unknown."""
+        """Expected run time with the windows relative to the reference run [-]; None without the cost fraction."""
         return self.settings.run_time_share(self.rigid_fraction)
 
 
@@ -285,7 +285,7 @@ def _suggest_window(
     shortest: float,
     landed: float | None,
 ) -> PlannedFlight:
-    """Complete a row of the plan with the window suggested for its flight, which starts after the previous landing.
+    """Complete a row of the plan with the window that is suggested if the flight starts after the previous landing.
 
     The energy alone shows a different start of the flight to each td, and some td show an oscillator that others do
     not: the row has the flight as seen from the chosen td.
@@ -323,7 +323,7 @@ def _suggest_window(
 
 
 def _explain_grade(decision: Decision, pair: Pair) -> str:
-    """Explain why a pair is too poor to be planned, and how to plan it anyway."""
+    """Explain why a pair is too poor for a planned window, and how to plan the window anyway."""
     times = f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
     advice = f"with `min_quality` {decision.grade} it is planned nevertheless"
     return f"{decision.verdict} {times}: {decision.reason}. To improve: {decision.cure}; {advice}"
@@ -373,7 +373,7 @@ def _leave_out_short(rows: Sequence[PlannedFlight]) -> Iterator[PlannedFlight]:
 def _mark_status(
     rows: Sequence[PlannedFlight], done_rows: Sequence[DoneWindow]
 ) -> Iterator[PlannedFlight]:
-    """Mark windows to be planned again: all after the first that locks in energy, or after a contact of rigid parts."""
+    """Mark the windows to be planned again: all after the first that locks in energy or has a contact while rigid."""
     in_contact = next((done for done in done_rows if done.rigid_in_contact), None)
     why = ""
     if in_contact:

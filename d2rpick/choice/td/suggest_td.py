@@ -40,16 +40,16 @@ if TYPE_CHECKING:
 
     Choice = tuple[Situation, Pair]
 
-# Number of the most promising energy peaks, and also of the last peaks, that the search for the best td tries.
+# The search for the best td tries this many of the most promising energy peaks, and as many of the last peaks.
 _MOST_PEAKS: Final = 12
-# Smallest lengths of the windows compared for many modes, relative to the longest window [-].
+# The windows compared for many modes have at least these lengths, relative to the longest window [-].
 _LEAST_RIGID: Final = (0.5, 0.25)
 _FEWEST_TD, _MOST_TD = 3, 1000
-# Number of td in a uniform grid; it suffices for a smooth curve on paper and on a screen.
+# Number of td values in a uniform grid; it suffices for a smooth curve on paper and on screen.
 STEPS: Final = 200
 # Number of decimals with which errors are shown to the user.
 _READ: Final = 3
-# Excess of rigid time over the recommended pair at which a pair is mentioned, as a fraction of the td range [-].
+# A pair is mentioned if it is rigid for longer than the recommended pair by this fraction of the td range [-].
 _MUCH: Final = 0.1
 # Safety factor on the uncertainty of a contact time that is estimated from the energy [-].
 # In 20 computed falls, the uncertainty was up to 1.9 times its estimate.
@@ -98,7 +98,7 @@ def bound_rigid_times(situation: Situation, times: Samples) -> Samples:
 def _find_first_near(
     lowest: Samples, highest: Samples, level: Samples, near: Samples
 ) -> Samples:
-    """Return the index of the first state with an energy at or beyond each level, or else the number of states.
+    """For each level, return the index of the first state whose energy reaches it; the number of states if none does.
 
     ``lowest`` and ``highest`` are the extremes of the energy up to each state.  ``near`` is the largest level error
     that counts as near; if it is negative, the energy must have been on both sides of the level.
@@ -316,7 +316,7 @@ def _select_beating(choice: Choice, situations: Iterable[Situation]) -> list[Cho
 def find_best_known(
     look: Look, history: History, window: tuple[float, float]
 ) -> tuple[Situation, tuple[float, float]]:
-    """Return the situation with the most certain flight in ``window``, and the td range that keeps the margin [time].
+    """Return the situation with the most certain flight in ``window``, and the td range before the margin [time].
 
     Raises
     ------
@@ -329,7 +329,7 @@ def find_best_known(
 
 
 def _find_latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Return the last td in the range that keeps the margin even after rounding to printed digits.
+    """Return the last td in the range that respects the margin even after rounding to printed digits.
 
     If no td of the window keeps it, return the last td in the flight.
     """
@@ -404,7 +404,7 @@ def _choose_by_residual(
 
 
 def _select_surest(pairs: Sequence[Choice]) -> list[Choice]:
-    """Return the pairs with the most certain tr, only from those long enough to be planned if there are any."""
+    """Return the pairs with the most certain tr; pairs that are too short to be planned are used only if all are."""
     if not pairs:
         return []
     record = pairs[0][0].history.time
@@ -487,7 +487,7 @@ def _find_best_of_long(pairs: Sequence[Choice]) -> Choice:
 def _list_times_by_modes(
     situation: Situation, bounds: tuple[float, float, float], share: float
 ) -> list[float]:
-    """Return the td of the smallest residuals with rigid times of at least ``share`` of the longest; empty for few td.
+    """Return td with the locally smallest residuals and at least ``share`` of the longest rigid time; empty for few td.
 
     ``bounds`` are the first td, the first tr and the last td [time].
     """
@@ -520,7 +520,7 @@ def _list_times_by_modes(
 def _find_least_error(
     profile: Profile, first: float, last: float
 ) -> tuple[float, float]:
-    """Return the smallest frozen-deformation error of a tr in a range [-], and that tr [time]; infinity if none."""
+    """Return the smallest frozen-deformation error [-] in a range of tr, and its tr [time]; infinite without any tr."""
     rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
     errors = profile.error[rows]
     if not errors.size:
@@ -557,7 +557,7 @@ def _choose_by_level(
 def _list_by_rigid_time(
     situation: Situation, times: Iterable[float]
 ) -> Iterator[Choice]:
-    """Yield acceptable choices by descending bound of the rigid time, while a longer rigid time is possible."""
+    """Yield acceptable choices in descending order of the bound on their rigid time, until none can be longer."""
     tds = np.fromiter(times, np.float64)
     longest = 0.0
     bounds = bound_rigid_times(situation, tds)
@@ -571,7 +571,7 @@ def _list_by_rigid_time(
 
 
 def _select_acceptable(situations: Iterable[Situation]) -> list[Choice]:
-    """Return the situations whose recommended pair saves time, each with its pair."""
+    """Return the situations whose recommended pair saves time, together with this pair."""
     return [
         (candidates.situation, candidates.saving)
         for candidates in rank_candidates([*situations], in_flight=True)

@@ -46,11 +46,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.td.plan import RunPlan
 
-# Largest displayed error of another td that is mentioned, as a fraction of the displayed error at the given td [-].
+# Another td is mentioned if its displayed error is at most this fraction of the one at the given td [-].
 _MUCH_LESS: Final = 0.5
-# Smallest rigid time of another pair that is mentioned, as a fraction of the given pair's rigid time [-].
+# Another pair is mentioned if its rigid time is at least this fraction of the given pair's rigid time [-].
 _LEAST_KEPT: Final = 0.5
-# Number of td values in the grid of a page, so that its curve has a point every few pixels.
+# Number of td values in the grid on a page; at this number, its curve has a point every few pixels.
 _STEPS_OF_PAGE: Final = 120
 # Smallest number of td values per flight if a plan has many flights.
 _FEWEST_STEPS: Final = 40
@@ -73,7 +73,7 @@ class Offer(AnswerAtTd):
 
     @property
     def pair(self) -> Pair | None:
-        """The recommended pair at this td, by which different td are compared; None if no tr is recommended."""
+        """The recommended pair at this td, which represents the td in comparisons; None if no tr is recommended."""
         return self.candidates.pair
 
     @cached_property
@@ -168,7 +168,7 @@ def make_offers(
 
 @dataclass(frozen=True)
 class TradeOff:
-    """The answer of ``explore``: proposals by ascending td in the range ``td_window`` [time], which keeps the margin.
+    """The answer of ``explore``: proposals in ascending order of td in the range ``td_window`` [time].
 
     ``requested`` is the offer of the requested td, ``recommended`` that of the pair that ``suggest`` chooses in the
     window; ``suggestion`` is that answer in full.  ``start`` is the offer that others are compared with: that of the
@@ -261,7 +261,7 @@ def explore_run(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = make_look(history, settings, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    # The full search is used, because it finds out why there is no oscillator.
+    # The full search is used, because it determines why there is no oscillator.
     situations = [
         offer if offer.evidence.span else fully(offer.td) for offer in asked_at
     ]
@@ -274,7 +274,7 @@ def explore_run(
     # Before the first td of the flight, there are too few states to show a vibration.
     warned = suggestion.situation
     if td is not None and look(td).in_flight:
-        # The energy alone shows a different flight for each td, so the flight found by ``suggest`` is shown.
+        # The energy alone shows a different flight for each td, so the flight that ``suggest`` finds is shown.
         situation = warned = fully(td)
     start = requested or max(
         filter(_is_comparable, offers),
@@ -330,7 +330,7 @@ def _mark_unbeaten(offers: Sequence[Offer]) -> Iterator[Offer]:
 
 
 def _find_step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
-    """Return the nearest proposal with half the error, or else the recommended proposal if it is better, or else None.
+    """Return the nearest proposal with half the error; if there is none, the recommended proposal if it is better.
 
     Like ``suggest``, it tries the energy peaks first; if there is no energy peak, it takes a Pareto-optimal offer.
     """

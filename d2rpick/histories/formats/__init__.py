@@ -1,4 +1,4 @@
-"""List the file formats of histories: each format has one line in `READERS` and one module.
+"""List the file formats of histories; each format has one line in `READERS` and one module.
 
 A reader is imported only when a file may have its format. Help texts list the formats without importing their
 readers, which keeps start-up short.
@@ -13,12 +13,12 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Formats that split a run into a family of files (d3plot, d3plot01, ...), of which only the first has a header.
+# In these formats, a run is a family of files (d3plot, d3plot01, ...), and only the first file has a header.
 FAMILIES: Final = ("d3thdt", "d3plot")
 
 
 class Listed(NamedTuple):
-    """A file format, described without importing its reader (the ``module``).
+    """A file format, described without importing its reader ``module``.
 
     The regular expression ``hint`` matches in the first bytes of each file of the format. ``files`` matches the file
     names that the ``solver`` uses; its group ``root`` is the name of the run if the solver puts it into the file
@@ -32,7 +32,7 @@ class Listed(NamedTuple):
     files: str = ""
 
 
-# Formats are tried in this order. Earlier formats are the preferred sources of a quantity.
+# Formats are tried in this order. A quantity is preferably read from the format that comes first.
 # Binary formats come before text formats, because their numbers have more digits.
 # csv comes after the other text formats, because it accepts any text; rare formats come last.
 READERS: Final[Mapping[str, Listed]] = {

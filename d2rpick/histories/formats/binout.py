@@ -41,7 +41,7 @@ _DISPLACEMENTS: Final = ("x_displacement", "y_displacement", "z_displacement")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
-    """Open the files in each folder as one restart segment, because a solver writes a whole binout to one folder."""
+    """Open the files in each folder as one restart segment, because a solver writes each binout into one folder."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  pathlib would slow down start-up
@@ -50,7 +50,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
 
 
 class Binout(Database):
-    """All binout files of one restart segment, in the order of their family, read as one `Database`.
+    """All binout files of one restart segment, in family order, read as one `Database`.
 
     Raises FormatError if a file is not a binout, or if none of them has glstat, matsum or contact forces.
     """
@@ -90,7 +90,7 @@ class Binout(Database):
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # a property overrides a field
-        """The parts of the matsum branch, in the order of the first list of ids."""
+        """The parts in the matsum branch, in the order of the first id list."""
         _, branch = self._branches
         return tuple(
             Part(number, branch.legend.get(number, "")) for number in branch.part_ids
@@ -103,23 +103,23 @@ class Binout(Database):
 
     @cached_property
     def _nodes(self) -> Branch:
-        """The branch nodout, whose variables are lists with one value for each node."""
+        """The nodout branch, whose variables are lists with one value per node."""
         return Branch(_NODES, self._files, by_part=True)
 
     @cached_property
     def node_ids(self) -> tuple[int, ...]:  # type: ignore[override]  # a property overrides a field
-        """Numbers of the nodes with displacements in the branch nodout; none if its records are lost or damaged."""
+        """Numbers of the nodes with displacements in the nodout branch; none if its records are lost or damaged."""
         if self._nodes.damage or not self._nodes.has_variables(_DISPLACEMENTS):
             return ()
         return self._nodes.part_ids
 
     @cached_property
     def node_time(self) -> Samples:
-        """Times of the states of the branch nodout, shape (k,) [time]."""
+        """Times of the states in the nodout branch, shape (k,) [time]."""
         return self._nodes.time
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some nodes since the start of the run, shape (k, len(ids), 3)."""
+        """Return the displacements of the given nodes since the start of the run, shape (k, len(ids), 3)."""
         components = [self._nodes.part_channel(name, ids) for name in _DISPLACEMENTS]
         return np.stack(components, axis=2)
 
@@ -140,7 +140,7 @@ class Binout(Database):
         raise FormatError(self._without(name))
 
     def _without(self, name: str) -> str:
-        """Return the message that no file of the restart segment has a branch with this name."""
+        """Return the message that no file of the restart segment contains a branch with this name."""
         names = sorted(set().union(*(file.names for file in self._files)))
         return (
             f"{self.source}: no {name} in it, but {list_names(names) or 'nothing'}; "

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Number of values read at a time; it is small, so that the index arrays need little memory.
+# Number of values read at a time; it is small to limit the memory for the index arrays.
 _CHUNK: Final = 1 << 17
 
 
 @dataclass(frozen=True)
 class Group:
-    """States in one file that share a layout: their row numbers in the columns, and their byte offsets."""
+    """States in one file that share a layout, with their row numbers in the columns and their byte offsets."""
 
     file: Lsda
     layout: DirectoryLayout
@@ -41,7 +41,7 @@ class Group:
     starts: Indices
 
     def chunks(self, width: int) -> Iterator[Group]:
-        """Split the group into subgroups with few enough states that ``width`` values per state can be read at once."""
+        """Split the group into subgroups with so few states that ``width`` values per state fit into one read."""
         length = max(1, _CHUNK // max(1, width))
         for begin in range(0, self.rows.size, length):
             part = slice(begin, begin + length)
@@ -55,7 +55,7 @@ class Group:
         values = self.file.read(positions, variable.dtype)
         if variable.dtype.kind != "f":
             return values
-        # A NaN causes an error later, but only if the value is used.
+        # A NaN raises an error later, but only if the value is used.
         with np.errstate(invalid="ignore"):
             return values.astype(np.float64)
 
@@ -70,7 +70,7 @@ def _read_start(file: Lsda, branch: str) -> float:
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
-    """Return True if the last state of this branch in a file has another layout than the previous state."""
+    """Return True if the layout of a branch's last state in a file differs from that of the previous state."""
     layouts = file.visits[branch][2::3][-2:]
     return file.unfinished == branch and len({*layouts}) > 1
 
@@ -78,7 +78,7 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
 def _find_damages(
     numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
 ) -> Iterator[str]:
-    """Yield descriptions of signs that records of one file are lost or misplaced."""
+    """Yield descriptions of evidence that records of one file are lost or misplaced."""
     steps = np.diff(numbers)
     if (steps > 1).any():
         hole = int(np.argmax(steps > 1))
@@ -102,7 +102,7 @@ def _group_states(
 
 
 class Branch(Database):
-    """The states of one branch in all files of a family; the object is falsy if no file has the branch.
+    """The states of one branch in all files of a family; the object is false if no file contains the branch.
 
     A solver numbers its states consecutively. If a file begins with a higher number than the one after the last
     state, a file of the family is missing. A repeated number begins a newer leg, which writes the same variables:
@@ -130,7 +130,7 @@ class Branch(Database):
             (file for file in files if file.visits[name]),
             key=lambda file: _read_start(file, name),
         )
-        # Names of the files whose last state is not used, because it is incomplete.
+        # Names of the files whose last state is incomplete and therefore not used.
         self._unfinished = [
             file.source for file in visited if _is_unfinished(file, name)
         ]
@@ -210,14 +210,14 @@ class Branch(Database):
         return tuple(notes)
 
     def has_variables(self, names: Collection[str]) -> bool:
-        """Return True if there are states and each has all of these variables."""
+        """Return True if the branch has states and all of them contain all of these variables."""
         return bool(self._variables) and all(
             variables.keys() >= set(names) for variables in self._variables
         )
 
     @property
     def scalars(self) -> tuple[str, ...]:
-        """Floating-point variables that have one value in every state, in the order of the file."""
+        """Floating-point variables with one value per state, in file order."""
         first = self._variables[0] if self._variables else {}
         return tuple(
             name
@@ -230,7 +230,7 @@ class Branch(Database):
 
     @property
     def time_width(self) -> int:
-        """Smallest number of bytes of a time in any state; integer times cause an error when they are read."""
+        """Smallest number of bytes of the time in any state; integer times raise an error when they are read."""
         widths = [
             variables["time"].dtype.itemsize
             for variables in self._variables
@@ -246,7 +246,7 @@ class Branch(Database):
             ids = _read_integers(file, start, layout, "legend_ids")
             legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
-                continue  # The titles cannot be separated, because their length varies.
+                continue  # The titles cannot be separated, because they vary in length.
             raw = file.raw(start, legend)
             width = legend.count // ids.size
             for i, id_ in enumerate(ids.tolist()):
@@ -266,7 +266,7 @@ class Branch(Database):
         return tuple(part_ids)
 
     def text(self, name: str) -> str:
-        """Return the metadata text with this name; empty if there is none."""
+        """Return the metadata text with this name; empty if there is no such text."""
         for file, start, layout in self._metadata:
             if name in layout.variables:
                 return clean_text(file.raw(start, layout.variables[name]))
@@ -293,7 +293,7 @@ class Branch(Database):
         return column
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a variable of some parts, shape (n, len(ids))."""
+        """Return a variable of the given parts, shape (n, len(ids))."""
         columns = np.empty((self._numbers.size, len(ids)))
         for group, variable in self.checked(quantity):
             for part in group.chunks(max(variable.count, len(ids))):
@@ -309,7 +309,7 @@ class Branch(Database):
         return columns
 
     def checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
-        """Yield each group of states together with its variable of this name.
+        """Yield each group of states with its variable of this name.
 
         A count that fits neither the parts nor the other states shows that records of two states were merged; then no
         value of the state can be trusted.
@@ -334,7 +334,7 @@ class Branch(Database):
             yield group, variables[name]
 
     def _fitting(self, group: Group, name: str) -> set[int]:
-        """Return the plausible numbers of values of a variable: one, one per part, or as many as in the first state."""
+        """Return the plausible lengths of a variable: one, one per part, or the length in the first state."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
         return {self._variables[0].get(name, group.layout.variables[name]).count}
@@ -347,7 +347,7 @@ class Branch(Database):
         return {ids.size for _, _, ids in self._id_lists}
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        """Return the error for a value from an unreliable state."""
+        """Return the error that is raised for a value from an unreliable state."""
         return FormatError(
             f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
         )
@@ -363,7 +363,7 @@ class Branch(Database):
 
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
-        """The part id lists in the metadata, each with the number of its file and its byte offset."""
+        """The part id lists in the metadata, each with its file number and byte offset."""
         lists = (
             (file, at, _read_integers(file, at, layout, "ids"))
             for file, at, layout in self._metadata
@@ -388,7 +388,7 @@ class Branch(Database):
             [start for file, start, _ in self._id_lists if file == index],
             dtype=np.int64,
         )
-        # The last list before a state applies to it. A file from an MPI rank may have its list after its first states.
+        # A state uses the last list before it. A file from an MPI rank may have its list after its first states.
         before_state = np.searchsorted(list_starts, group.starts)
         in_force = np.maximum(lists_in_earlier_files + before_state - 1, 0)
         lists = {
@@ -420,7 +420,7 @@ class Branch(Database):
 
 
 def _is_scalar_variable(variable: Variable | None) -> bool:
-    """Return True if a variable consists of a single floating-point value."""
+    """Return True if a variable is a single floating-point value."""
     return variable is not None and variable.count == 1 and variable.dtype.kind == "f"
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Indices = NDArray[np.int64]
 
-# Branches that contain forces, each with the kind of object that exerts the force.
+# Branches that contain forces, keyed by name, with the type of object that exerts the force.
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
@@ -40,7 +40,7 @@ def read_binout_forces(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
 
 
 class ForceBranch(Branch):
-    """A branch whose variables are lists, with one value for each side of each contact, or for each wall."""
+    """A branch whose variables are lists, with one value per side of each contact, or one per wall."""
 
     @property
     def writes_forces(self) -> bool:
@@ -77,7 +77,7 @@ class ForceBranch(Branch):
 
 
 def _join_sides(branch: ForceBranch) -> Iterator[ContactForce]:
-    """Yield one force for each contact. The two sides have opposite forces, or only one side has a force."""
+    """Yield one force per contact. The forces on the two sides are opposite, or only one side has a force."""
     ids, first = branch.of_each("x_force")
     forces = np.stack(
         [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2

@@ -1,4 +1,4 @@
-"""Describe the blocks of solver text files, count repeated blocks, and read the numbers in them."""
+"""Describe the blocks of solver text files, count repeated blocks, and read the numbers in blocks."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Value that replaces the offset of a field if the field is truncated, or occurs twice in the block.
+# Placeholder for the offset of a field that is truncated or occurs twice in the block.
 UNSURE: Final = -1
 
-# Smallest length of a damaged line [bytes]; solvers write no line of this length.
+# Lines of at least this length are treated as damaged [bytes]; solvers never write lines this long.
 _OVERLONG: Final = 512
 
-# Number of bytes that are compared at once; they fit into the processor's cache.
+# Number of bytes that are compared at a time; these bytes fit into the processor cache.
 CHUNK: Final = 1 << 20
 # Number of adjacent blocks that are compared as one row, which halves the computing time.
 _FOLD: Final = 16
@@ -35,7 +35,7 @@ _LONGEST: Final = 1 << 22
 _NUMBER: Final = re.compile(
     rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
 )
-_EXACT: Final = 22  # Largest exponent of a power of ten that a double holds exactly.
+_EXACT: Final = 22  # Largest exponent at which a double holds a power of ten exactly.
 # Bit flags of a negative exponent and of a negative number; the lower bits contain the two exponent digits.
 _SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
 
@@ -56,7 +56,7 @@ class BlockLayout(NamedTuple):
 
 
 class Grammar(NamedTuple):
-    """Description of the blocks of a file format, which is sufficient for reading a file.
+    """Description of the blocks of a file format; it contains all that is needed to read a file.
 
     ``start`` is the text at the start of a block; ``lines`` matches the known lines. ``describe`` takes a block and
     these lines, returns the offsets of its numbers and the name of the last one, and sets the columns of the numbers
@@ -115,7 +115,7 @@ def read_head_of_listing(data: bytes | Content) -> tuple[str, str, int]:
 
 
 def make_head(title: str, database: str) -> str:
-    """Return the two header lines of a generated file. They name no release, because no solver wrote the file."""
+    """Return the two header lines of a generated file. They name no release, because no solver wrote this file."""
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
@@ -206,7 +206,7 @@ def _find_differing_bits(rows: Bytes, example: Bytes) -> Bytes:
 
 
 def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
-    """Combine rows, each containing one or more blocks of ``size`` bytes, into one block by a bitwise operation."""
+    """Combine rows, each of which holds one or more blocks of ``size`` bytes, into one block by a bitwise operation."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
 
@@ -279,7 +279,7 @@ def _decode_state_numbers(
 
 @cache
 def _make_scales(decimals: int) -> tuple[Samples, Samples]:
-    """Return factor and divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
+    """Return the factor and the divisor of an integer mantissa for each exponent and sign; one of the two is always 1.
 
     Factor and divisor are NaN if the conversion would be inexact.
     """
@@ -312,7 +312,7 @@ def parse_fortran_number(text: bytes) -> float:
 
 
 def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
-    """Return the values of fixed-width fields, equal to those of ``float()``; NaN for a field that is not a number.
+    """Return the values of fixed-width fields as ``float()`` would; NaN for a field that is not a number.
 
     Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power of ten are
     both exact doubles, so their product or quotient is correctly rounded. ``number`` converts all others.
@@ -354,7 +354,7 @@ def parse_fortran_numbers(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
     weights = np.array([float(10**exponent) for exponent in range(decimals, -1, -1)])
-    # The mantissas are exact at this point.
+    # The mantissas are still exact here.
     values: Samples = weights @ digits[:-2].astype(np.float64)
     tens, units = digits[-2:]
     scale = (

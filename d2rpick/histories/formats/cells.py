@@ -1,4 +1,4 @@
-"""Split lines of text into cells, and recognise numbers and missing values in them."""
+"""Split lines of text into cells, and recognise numbers and missing values in the cells."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
-# Values that spreadsheets write if a computation fails, in English and German.
-# A line that begins with such an error value is a row, although "#" is the comment character.
+# Values that spreadsheets write, in English and German, when a computation fails.
+# A line that begins with one of these error values is a row, although "#" is the comment character.
 _SPREADSHEET_ERRORS: Final = frozenset(
     {
         "#div/0!",
@@ -30,11 +30,11 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-# Pattern of the characters that replace a number that is too wide for its field.
+# Pattern of the characters that are printed when a number is too wide for its field.
 _OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
 # Pattern of a number, keyed by decimal sign.
-# The possessive quantifiers avoid backtracking, so that matching time is linear in the length of a cell.
+# The possessive quantifiers prevent backtracking, so that matching takes time proportional to the length of a cell.
 _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
@@ -43,17 +43,17 @@ _NUMBER: Final = {
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
 # Thousands separators that are tried in addition to "." and ",".
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
-# Pattern of a date, clock time or percentage. Such a cell is no number, but is no sign of a wrong separator either.
+# Pattern of a date, clock time or percentage. It is not a number, but does not show that the separator is wrong.
 _DATE_OR_SHARE: Final = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
 )
-# Characters of lines that are drawn between rows or around a table.
+# Characters that rules between rows or around a table consist of.
 _RULE: Final = "-=+|:_ \t"
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
 def split_cells(line: str, separator: str | None) -> list[str]:
-    """Split a line into its cells, without outer blanks and quotes; a separator inside quotes belongs to its cell.
+    """Split a line into its cells, without outer spaces and quotes; a separator inside quotes belongs to its cell.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def split_cells(line: str, separator: str | None) -> list[str]:
 
 
 def is_skipped(line: str) -> bool:
-    """Return True if a line is blank, a comment, or a drawn line.
+    """Return True if a line is blank, a comment, or a horizontal rule.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def is_skipped(line: str) -> bool:
 
 
 def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
-    """Return the number in a cell, or None; unlike Python's float, reject words (``nan``) and underscores.
+    """Return the number in a cell, None if it has none; unlike Python's float, reject words (``nan``) and underscores.
 
     Examples
     --------
@@ -110,12 +110,12 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
 
 
 def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
-    """Return True if a cell contains a number. The value is not computed, because many cells are tested."""
+    """Return True if a cell contains a number. The number is not computed, because many cells are tested."""
     return _written_number(cell, decimal, thousands) is not None
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
-    """Return the text of a number without thousands separators and with an ASCII minus sign, or None."""
+    """Return the text of a number without thousands separators and with an ASCII minus sign; None if it is invalid."""
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-")
     if thousands and thousands in cell:
@@ -141,7 +141,7 @@ def is_word(cell: str) -> bool:
 
 
 def find_thousands(cells: Sequence[str], decimal: str) -> str:
-    """Return the thousands separator in the cells, or an empty string if no cell proves that there is one.
+    """Return the thousands separator in the cells; empty if no cell proves that there is one.
 
     A cell proves it with a decimal sign too, or with two such separators: "1.234" alone may be either.
 

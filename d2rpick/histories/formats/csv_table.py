@@ -1,4 +1,4 @@
-"""Read tables: find the column with a given name or number, and the numbers in the rows."""
+"""Read tables: find a column by name or number, and read the numbers in the rows."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def find_own_times(layout: Layout) -> tuple[int, ...]:
 def find_numeric_columns(
     layout: Layout, sample: Sequence[Sequence[str]]
 ) -> frozenset[int]:
-    """Return the columns that contain a number in at least one sampled row; all columns if no row was sampled."""
+    """Return the columns with a number in at least one sampled row; all columns if no row was sampled."""
     columns = range(layout.columns)
     if not sample:
         return frozenset(columns)
@@ -93,7 +93,7 @@ def find_numeric_columns(
 
 
 def _sample_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
-    """Return the cells of sampled rows: the first rows, the last rows, and rows evenly spaced in between."""
+    """Return the cells of sampled rows: the first rows, the last rows, and evenly spaced rows in between."""
     lines = [line for line in text.sample(begin) if not is_skipped(line)]
     rows = [split_cells(line, layout.separator) for line in lines]
     return [row for row in rows if len(row) >= layout.columns]
@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column, with notes on assumptions; of curves side by side, use the time of the first energy.
+    """Return the time column and notes on assumptions; for curves side by side, the time of the first energy is used.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -148,7 +148,7 @@ def find_time_column(
 def find_internal_energy(
     source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]
 ) -> int:
-    """Return the only numeric column other than times, or the only column whose name means an internal energy."""
+    """Return the only numeric column besides the times, or the only column whose name denotes an internal energy."""
     candidates = [
         column
         for column in range(layout.columns)
@@ -209,7 +209,7 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves. An incomplete last line is used only if it has the selected columns."""
+    """Open text files as tables or curves. An unterminated last line is used only if it has the selected columns."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -244,7 +244,7 @@ class Table(Database):
         self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        # False once a row has shown that a column is not numeric.
+        # False once a row has shown that the column is not numeric.
         self._together = True
         if not is_skipped(text.unended):
             self.complete = _is_whole_row(
@@ -261,12 +261,12 @@ class Table(Database):
         self._notes += [*notes, *left_out]
 
     def find_energy_unit(self, channel: str) -> str:
-        """Return the energy unit in the header of a column; empty if the header contains no unit."""
+        """Return the energy unit in the header of a column; empty if the header contains none."""
         return check_energy_unit(self._layout.unit(self._columns[channel]))
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
-        """Notes on assumptions and omissions; they are complete only after the required columns have been read."""
+        """Notes on assumptions and omissions; the list is complete only after the required columns have been read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
 
@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name means internal energy, or the only column besides the time; else raise FormatError."""
+        """The column whose name denotes internal energy, otherwise the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
@@ -296,7 +296,7 @@ class Table(Database):
         )
 
     def find(self, wanted: str) -> str:
-        """Return the channel name of a column given by name or 1-based number; else a FormatError lists the columns."""
+        """Return the channel name of a column given by name or 1-based number; raise FormatError if there is none."""
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = find_column(self.source, self._layout, wanted)
@@ -322,7 +322,7 @@ class Table(Database):
         return times
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
-        """Raise FormatError if the table has one row per part at each time."""
+        """Raise FormatError if the table has one row for each part at each time."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
@@ -367,7 +367,7 @@ class Table(Database):
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
-        """Return the requested (or default) columns. An unterminated last line is used only if it has all of them."""
+        """Return the requested or default columns. An unterminated last line is used only if it has all of them."""
         try:
             names = [self.find(wanted) for wanted in selection.energy] or [
                 self.energy_channel
@@ -383,8 +383,8 @@ class Table(Database):
         if column in self._failed:
             raise self._failed[column]
         if column not in self._read and self._together:
-            # The first pass over the table reads the required columns, and the columns that indicate a flight.
-            # The second pass over the table reads all other columns, because they are usually requested next.
+            # The first pass over the table reads the required columns and the columns that indicate a flight.
+            # The second pass reads all other columns, because they are usually requested next.
             quantities = [
                 position
                 for name, position in self._columns.items()
@@ -395,7 +395,7 @@ class Table(Database):
                 wanted = {*range(self._layout.columns)} - self._read.keys()
             try:
                 self._keep([self._time, *(wanted - {self._time})])
-            except FormatError:  # The error may be in a column that is not needed.
+            except FormatError:  # The error may be in a column that is not required.
                 self._together = False
                 self._read_one_by_one(
                     [other for other in quantities if other != column]
@@ -405,7 +405,7 @@ class Table(Database):
         return self._read[column]
 
     def _read_one_by_one(self, columns: Sequence[int]) -> None:
-        """Read these columns one by one; omit, with a note, each column that lacks a number in some row."""
+        """Read these columns one by one; skip each column that lacks a number in some row, and add a note."""
         for column in columns:
             try:
                 self._keep([self._time, column])
@@ -433,7 +433,7 @@ class Table(Database):
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if an unterminated line has all values, and its last value is unused or certainly complete."""
+    """Return True if an unterminated line has all values and its last value is either unused or certainly complete."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
@@ -442,7 +442,7 @@ def _is_whole_row(
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    r"""Write columns of shape (n,) under their names, each number with the fewest digits that preserve it exactly.
+    r"""Write columns (n,) under their names, each number with the fewest digits that preserve it exactly.
 
     Examples
     --------

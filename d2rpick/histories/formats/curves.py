@@ -1,4 +1,4 @@
-"""Read text files that list curves one after another, each with its own times, as postprocessors export them.
+"""Read text files that list curves one after another, each with its own times, as exported by postprocessors.
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a
 star, pairs of numbers and ``endcurve``. LS-PrePost's XY pairs: a line with the number of pairs, then the pairs. T/HIS
@@ -36,19 +36,19 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"
-# Number of characters at the start of a line in which a label is expected.
+# Number of characters at the start of a line within which a label is expected.
 _LONGEST_LABEL: Final = 1000
-# Pattern of the type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
+# Pattern of the type and factor that Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
 # Smallest number of labels above a curve: x label, y label and curve name; the title may be blank.
 _FEWEST_LABELS: Final = 3
-# Largest number of digits in a number of pairs; a longer number is a sign of damage.
+# Largest number of digits in a pair count; a longer number is a sign of damage.
 _MOST_DIGITS: Final = 12
 
 
 class _TextCurve:
-    """A curve: its name, its pairs as text cells, and the line numbers of the pairs."""
+    """A curve: its name, its pairs as text cells, and the line numbers of these pairs."""
 
     def __init__(self, name: str) -> None:
         from array import array  # Imported here to keep start-up fast.
@@ -60,7 +60,7 @@ class _TextCurve:
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
-    """Read a text of curves; None if the text has another form. The first selected curve determines the times."""
+    """Read a text that lists curves; None for any other text. The first selected curve determines the times."""
     curves = _CurveText(text)
     for read in (_read_curveplot, _read_t_his, _read_dynaform, _read_xy_pairs):
         if read(curves):
@@ -69,7 +69,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _CurveText:
-    """State of the reader: the curves that it has read so far, and the label of their x axis."""
+    """State of the reader: the curves read so far, and the label of their x axis."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -77,7 +77,7 @@ class _CurveText:
         self.curves: list[_TextCurve] = []
         self.x_label = self.time_unit = ""
         self.stops = ""
-        self.last = 0  # Number of the line read last.
+        self.last = 0  # Number of the line that was read last.
 
     def top(self, count: int) -> list[str]:
         """Return the first lines of the text that are neither blank nor comments."""
@@ -87,7 +87,7 @@ class _CurveText:
         )
 
     def lines(self) -> Iterator[tuple[int, str]]:
-        """Yield number and text of all lines that are neither blank nor comments."""
+        """Yield the number and text of all lines that are neither blank nor comments."""
         for number, line in enumerate(self._text.lines(0), 1):
             self.last = number
             if _has_content(line):
@@ -109,7 +109,7 @@ class _CurveText:
         curve.lines.append(number)
 
     def count(self, number: int, digits: str) -> int:
-        """Return the number of pairs or curves that a line announces."""
+        """Return the number of pairs or curves announced in a line."""
         if len(digits) > _MOST_DIGITS:
             raise FormatError(
                 f"{self.source}:{number}: a count of {len(digits)} digits; the file is damaged"
@@ -126,7 +126,7 @@ class _CurveText:
 
 
 class Curves(Database):
-    """The curves in one text as a `Database` without parts; its times are those of the first requested curve."""
+    """The curves in one text, as a `Database` without parts whose times are those of the first requested curve."""
 
     format = "csv"
     named_by_people = True
@@ -166,7 +166,7 @@ class Curves(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only curve, or the only curve whose name means an internal energy; otherwise raise FormatError.
+        """The only curve, or the only curve whose name denotes an internal energy; otherwise raise FormatError.
 
         The error lists all curves.
         """
@@ -223,7 +223,7 @@ class Curves(Database):
         """Return the times or values of a curve, shape (n,); raise FormatError for a cell that is not a number."""
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        # parse_cell returns None for a string that is not a number, and numpy converts None into NaN.
+        # parse_cell returns None for a string that is not a number, and numpy converts None to NaN.
         numbers = np.array([parse_cell(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
@@ -236,7 +236,7 @@ class Curves(Database):
         return numbers
 
     def _menu(self) -> str:
-        """Return numbers and names of the curves that the user can choose."""
+        """Return the numbers and names of the curves from which the user can choose."""
         return list_names(
             [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
         )
@@ -271,7 +271,7 @@ def _read_curveplot(text: _CurveText) -> bool:
 def _read_t_his(text: _CurveText) -> bool:
     """Read a .cur file of T/HIS; return False for any other text."""
     top = [_remove_type(line) for line in text.top(5)]
-    # The title may be blank, so the x label is the first or the second label.
+    # The title may be blank, so the x label is either the first or the second label.
     labels = list(takewhile(lambda line: not _is_pair(line), top))
     x_label = next((i for i in (0, 1) if i < len(labels) and is_time(labels[i])), None)
     if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):
@@ -312,7 +312,7 @@ def _remove_type(line: str) -> str:
 
 
 def _find_unit_of_type(line: str) -> str:
-    """Return the time unit that corresponds to the factor of a label; empty if the label has no factor."""
+    """Return the time unit that corresponds to the factor in a label; empty if the label has no factor."""
     match = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
     factor = parse_cell(match[2].strip(), ".") if match and match[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.floating[Any]]
 
-# Values of the whole model in the order in which they follow the time of a state.
+# Values of the whole model, in the order in which they follow the time in a state.
 _MODEL: Final = (
     "kinetic_energy",
     "internal_energy",
@@ -57,17 +57,17 @@ _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _WALL: Final = "rigid_wall_{}_force"
-# Number of bytes at the end of a file in which its end mark is expected.
+# Number of bytes at the end of a file within which the end mark is expected.
 _TAIL: Final = 1 << 16
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if these first bytes belong to a d3plot or d3part; never raises."""
+    """Return True if these first bytes belong to a d3plot or d3part. This function never raises."""
     return detect_family(head) in ("d3plot", "d3part")
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
-    """Open each family of files as a restart segment of the run; only the first file of a family has a header."""
+    """Open each file family as a restart segment of the run; only the first file of a family has a header."""
     families: dict[str, dict[int, Source]] = {source.name: {} for source in sources}
     for source in sources:
         first = source.name.rstrip("0123456789")
@@ -83,7 +83,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
 
 
 class _States(NamedTuple):
-    """First words of the states of a family, ``rows`` (n, values); ``ended`` is True if every file has its end mark."""
+    """First words of the states of a family, ``rows`` (n, values); ``ended`` is True if every file has an end mark."""
 
     rows: Rows
     ended: bool = True
@@ -91,7 +91,7 @@ class _States(NamedTuple):
 
 
 class D3plot(Database):
-    """One family of files as a `Database`; parts and whole model have the same times.
+    """One file family as a `Database`; the parts and the whole model have the same times.
 
     Raises FormatError if the head cannot be read, or if the states do not match it.
     """
@@ -154,7 +154,7 @@ class D3plot(Database):
         )
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a quantity of some parts, shape (n, len(ids)); momentum is computed as mass times velocity.
+        """Return a quantity of the given parts, shape (n, len(ids)); a momentum is computed as mass times velocity.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class D3plot(Database):
 
 
 def _read_states(files: Sequence[Source], head: Head) -> _States:
-    """Read the first words of all states of a family; in the first file, the states follow the header."""
+    """Read the first words of all states of a family; in the first file, the states come after the header."""
     real = head.form.real
     values = 1 + head.globals
     contents = [make_content(file.data) for file in files]
@@ -218,7 +218,7 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
         and set(first_words_after[1:]) == {end_mark}
         and _is_ascending(rows[:, 0], ends)
     ):
-        # If each file is complete, as usual, no file needs a check of its own.
+        # If each file is complete, as is usual, no file needs a separate check.
         return _States(rows)
     states_of_files = []
     for file, begin, piece, word in zip(
@@ -234,10 +234,10 @@ def _read_states(files: Sequence[Source], head: Head) -> _States:
 
 
 def _is_ascending(time: NDArray[np.floating[Any]], ends: Sequence[int]) -> bool:
-    """Return True if times are finite and ascend in each file; ``ends`` are cumulative state counts of the files."""
+    """Return True if times are finite and ascend in each file; ``ends`` (files,) are cumulative state counts."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    # After a restart, a file may begin with a state that an earlier file already contains.
+    # After a restart, a file may begin with a state that an earlier file contains, too.
     ascends[[end - 1 for end in ends if 0 < end < time.size]] = True
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
@@ -257,7 +257,7 @@ def _check_states(
         end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
-        ended = True  # The states begin in the next file of the family.
+        ended = True  # The states begin in the next file of this family.
     if not ended:
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
@@ -276,7 +276,7 @@ def _check_states(
 
 
 def _note_cut_file(content: Content, name: str, end: int, rows: Rows) -> str:
-    """Return the note on a file without an end mark at its end."""
+    """Return the note on a file that does not end with an end mark."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
     return (
@@ -290,7 +290,7 @@ def _is_blank(content: Content, begin: int, size: int) -> bool:
 
 
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
-    """Raise FormatError if the end mark of a file lies inside a state, because the state length is then wrong."""
+    """Raise FormatError if the end mark of a file lies inside a state, which shows that the state length is wrong."""
     first = max(begin, len(content) - _TAIL)
     tail = content[first : len(content)]
     mark = np.array(END, head.form.real).tobytes()
@@ -305,7 +305,7 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
 
 
 def _note_missing_files(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
-    """Return a note on gaps in the numbering of the files of a family."""
+    """Return a note on gaps in the file numbers of a family."""
     gaps = [
         (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
     ]

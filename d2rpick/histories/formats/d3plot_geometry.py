@@ -25,8 +25,8 @@ _EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
 _FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
 _CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
 
-_NUMBERING: Final = 10  # Length of the numbering section before its ids [words].
-# Length of the head of the numbering section if the section also lists part ids [words].
+_NUMBERING: Final = 10  # Length of the numbering section up to its ids [words].
+# Length of the head of a numbering section that also lists part ids [words].
 _PART_NUMBERING: Final = 16
 # Length of a title [bytes], which does not depend on the word size.
 _TITLE: Final = 72
@@ -39,7 +39,7 @@ _MOST_TITLES: Final = 1_000_000
 
 
 class Geometry:
-    """The sections between the control words and the titles; they are skipped one after another.
+    """The sections between the control words and the titles, which are skipped one after another.
 
     ``at`` is the word at which the next section begins. ``part_ids`` are the ids of the parts, first sorted, then in
     the order of their definition; empty if the file has none. The other attributes count the values in a state.
@@ -71,7 +71,7 @@ class Geometry:
         self._extra_nodes()
 
     def _next(self, count: int) -> tuple[int, ...]:
-        """Read ``count`` integers from the file, and move on; raise FormatError if one of them is negative."""
+        """Read ``count`` integers from the file and advance; raise FormatError if one of them is negative."""
         counts = self._words.integers(self.at, count)
         if min(counts) < 0:
             raise self._words.damaged(f"a count of {min(counts)} at word {self.at}")
@@ -85,7 +85,7 @@ class Geometry:
             self.at += materials
 
     def _sph_flags(self) -> None:
-        """Skip the SPH flags; count the values of a particle."""
+        """Skip the SPH flags, and count the values of a particle."""
         if self._control["nmsph"] <= 0:
             return
         begin = self.at
@@ -97,13 +97,13 @@ class Geometry:
         self.at = begin + length
 
     def _airbag_flags(self) -> None:
-        """Skip the flags of particle airbags; count their values in a state."""
+        """Skip the particle airbag flags, and count the airbag values in a state."""
         airbags = self._control["npefg"] % 1000
         version = self._control["npefg"] // 1000
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
-        # Version 4 of the airbag data has a word for the number of chambers.
+        # Version 4 of the airbag data has an additional word for the number of chambers.
         self.at += version == 4
         # Each value has a type and a name.
         self.at += 9 * (of_geometry + of_particle + of_airbag)
@@ -120,7 +120,7 @@ class Geometry:
         self.at += count_dimensions(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
-        # The start of the numbering section shows where the additional nodes are.
+        # The start of the numbering section shows whether the additional nodes come before or after it.
         follows = not more_nodes or self._begins_numbering(
             self.at + more_nodes + shells
         )
@@ -198,14 +198,14 @@ class Geometry:
 
 
 class Titles:
-    """The titles after the geometry; ``at`` is the offset after the titles, where the states may begin [byte]."""
+    """The titles after the geometry; ``at`` is the offset of the first byte after them, where the states may begin."""
 
     def __init__(self, words: Words, at: int) -> None:
         self._words, self.at = words, at
         self.of_run, self.of_parts = "", dict[int, str]()
 
     def read(self) -> None:
-        """Read all titles; raise FormatError if the geometry ends elsewhere."""
+        """Read all titles; raise FormatError if the geometry does not end here."""
         width = self._words.form.width
         if not self._words.has(self.at, width):
             self._words.bytes(self.at, width)
@@ -219,7 +219,7 @@ class Titles:
                 self.at += width
 
     def _section(self) -> bool:
-        """Read the title section that begins here; return False if another section begins here."""
+        """Read the title section that begins here; return False if the section here is of another type."""
         (kind,), width = self._integers(1), self._words.form.width
         if kind == _RUN_TITLE:
             self.of_run = clean_text(self._words.bytes(self.at + width, _TITLE))
@@ -242,6 +242,6 @@ class Titles:
         return True
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Return the given number of integers without moving on in the file."""
+        """Return the given number of integers without advancing in the file."""
         integers = self._words.bytes(self.at, count * self._words.form.width)
         return tuple(np.frombuffer(integers, self._words.form.integer).tolist())

@@ -1,4 +1,4 @@
-"""Read the header of an LS-DYNA d3plot or d3thdt: number format, length of the states, and parts."""
+"""Read the header of an LS-DYNA d3plot or d3thdt: number format, state length, and parts."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 # Number of values of the whole model: kinetic, internal and total energy, and three velocity components.
 GLOBALS: Final = 6
 
-# Value that replaces the number of parts in files packed by femzip.
+# Value that femzip writes in place of the number of parts.
 _FEMZIP: Final = 76_893_465
-# Largest control word ``maxint`` at which a state lists deleted elements instead of deleted nodes.
+# If the control word ``maxint`` is at most this value, a state lists deleted elements instead of deleted nodes.
 _BY_ELEMENT: Final = -10_000
-# First release whose states contain the position of a rigid wall next to its force.
+# First release whose states contain the position of each rigid wall next to its force.
 _WITH_WALL_PLACES: Final = 971.0
 
-# Number of thermal values of a node, keyed by flag: temperatures of one or three layers, and heat flux.
+# Number of thermal values per node, keyed by flag: temperatures of one or three layers, and the heat flux.
 _THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}
 
 
@@ -111,14 +111,14 @@ def read_d3plot_head(content: Content, source: str) -> Head:
 
 
 def _count_parts(control: Mapping[str, int]) -> int:
-    """Return the number of parts. Older files give a separate number for each kind of element."""
+    """Return the number of parts. Older files give a separate number for each element type."""
     return control["nmmat"] or sum(
         control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
     )
 
 
 def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
-    """Return the part ids in the order of the part values.
+    """Return the part ids in the order in which the part values are stored.
 
     A file of parts that are numbered consecutively has no list of their ids; the titles have their ids too.
     """
@@ -130,7 +130,7 @@ def _order_ids(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ..
 
 
 def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, str]:
-    """Return the number of quantities of a part (7, or fewer in older files), or 0 with the reason."""
+    """Return the number of quantities per part (7, or fewer in older files), or 0 with the reason."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
         return (
@@ -146,7 +146,7 @@ def _count_values_of_part(values: int, number: int, source: str) -> tuple[int, s
 
 
 def _count_walls(values: int, parts: int, of_part: int, words: Words) -> int:
-    """Return the number of rigid walls, whose forces follow the values of the parts; 0 if the number is ambiguous.
+    """Return the number of rigid walls, whose forces follow the part values; 0 if the number is ambiguous.
 
     Releases with a name (R9 and later) are newer than 971, although the number in their files is 960.
     """
@@ -184,7 +184,7 @@ def _count_words_of_state(control: Mapping[str, int], geometry: Geometry) -> int
 
 
 def _count_words_of_node(control: Mapping[str, int]) -> int:
-    """Count the words of a node in a state."""
+    """Count the words per node in a state."""
     vectors = sum(control[name] != 0 for name in ("iu", "iv", "ia"))
     heat = control["it"] % 10
     scaled_mass = control["it"] // 10 % 10 == 1

@@ -1,4 +1,4 @@
-"""Read the words of LS-DYNA's d3plot and d3thdt, of 4 or 8 bytes in either byte order, and the control words.
+"""Read the control words and other words of LS-DYNA's d3plot and d3thdt, in 4 or 8 bytes and either byte order.
 
 The control words at the start of the first file keep the names of their source: "LS-DYNA Database Binary Output
 Files" of LSTC.
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 # Number that marks the end of the geometry, of the titles, and of the states in each file.
 END: Final = -999999.0
-HEAD: Final = 512  # Length of the control words if a word has 8 bytes [bytes].
-# Number of control words in any file; the control word ``extra`` gives the number of additional ones.
+HEAD: Final = 512  # Length of the control words if each word has 8 bytes [bytes].
+# Number of control words in every file; the control word ``extra`` says how many more follow.
 CONTROL: Final = 64
 
 _PLACES: Final = {
@@ -35,27 +35,27 @@ _PLACES: Final = {
     "penout": 78, "engout": 79,
 }  # fmt: skip
 _SIGNED: Final = ("nel8", "maxint")  # Control words whose sign is used as a flag.
-# Index of the word that contains the name of the release; the next word contains the release number.
+# Index of the word that contains the release name; the next word contains the release number.
 _RELEASE: Final = 13
 _FAMILIES: Final = {1: "d3plot", 3: "d3thdt", 5: "d3part"}
-LONG_IDS: Final = 1000  # Number that is added to the file type if ids have 8 bytes.
+LONG_IDS: Final = 1000  # Number that is added to the file type if the ids have 8 bytes.
 _DIMENSIONS: Final = range(2, 10)
 
 
 class Form(NamedTuple):
-    """The number format of a file: the bytes per word, and the byte order as a character of `struct`."""
+    """The number format of a file: the bytes per word, and the byte order as a `struct` character."""
 
     width: int
     order: str
 
     @property
     def real(self) -> np.dtype[Any]:
-        """Numpy type of a real number."""
+        """Numpy type of the real numbers."""
         return np.dtype(f"{self.order}f{self.width}")
 
     @property
     def integer(self) -> np.dtype[Any]:
-        """Numpy type of an integer."""
+        """Numpy type of the integers."""
         return np.dtype(f"{self.order}i{self.width}")
 
 
@@ -75,7 +75,7 @@ def detect_form(head: bytes) -> Form | None:
 
 
 def detect_family(head: bytes) -> str | None:
-    """Return the family (d3plot, d3thdt or d3part) of a file with these first bytes, or None for other files."""
+    """Return the file family (d3plot, d3thdt or d3part) that these first bytes indicate; None for other files."""
     form = detect_form(head)
     if form is None:
         return None
@@ -112,11 +112,11 @@ class Words:
 
     @property
     def is_named(self) -> bool:
-        """True if the name of the release begins with R (R920, R12); older releases are only numbered."""
+        """True if the release name begins with R (R920, R12); older releases have only a number."""
         return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
 
     def version(self) -> str:
-        """Return solver name and release, such as LS-DYNA R920. Older files contain no release name."""
+        """Return the solver name and release, such as LS-DYNA R920. Older files contain no release name."""
         name = clean_text(self.bytes(_RELEASE * self.form.width, 4))
         return f"LS-DYNA {name}" if name.isalnum() else "LS-DYNA"
 
@@ -133,7 +133,7 @@ class Words:
         return bool(np.frombuffer(data, self.form.real)[0] == END)
 
     def has(self, at: int, size: int) -> bool:
-        """Return True if the file has at least ``size`` bytes from the offset ``at`` on."""
+        """Return True if the file has at least ``size`` bytes after the offset ``at``."""
         return at + size <= len(self._content)
 
     def damaged(self, content: str) -> FormatError:
@@ -150,5 +150,5 @@ class Words:
 
 
 def count_dimensions(control: Mapping[str, int]) -> int:
-    """Return the number of coordinates of a node; a control word above 3 also contains flags."""
+    """Return the number of coordinates per node; a control word above 3 contains flags as well."""
     return min(control["ndim"], 3)

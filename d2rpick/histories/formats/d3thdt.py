@@ -1,4 +1,4 @@
-"""Read LS-DYNA's d3thdt: a d3plot of selected nodes and elements, with a shorter output interval."""
+"""Read LS-DYNA's d3thdt, which is a d3plot of selected nodes and elements with a shorter output interval."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if these first bytes belong to a d3thdt; never raises."""
+    """Return True if these first bytes belong to a d3thdt. This function never raises."""
     return detect_family(head) == "d3thdt"
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[d3plot.D3plot]:
-    """Open each family as a restart segment of the run."""
+    """Open each file family as a restart segment of the run."""
     legs = d3plot.open_legs(sources, selection)
     for leg in legs:
         leg.format = "d3thdt"

@@ -1,4 +1,4 @@
-"""Read solver text files that consist of blocks with fixed columns.
+"""Read solver text files that consist of fixed-column blocks.
 
 glstat and matsum contain one block for each state. Most blocks of a file have the same lines, hence the same number
 of bytes. So a block is parsed line by line once; the blocks after it are only compared with it, byte by byte where
@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     Fields = NDArray[np.bytes_]
 
 _RECENT: Final = 12  # Number of recent block layouts tried before parsing a block.
-# Upper limit for the length of the first line of a block [bytes].
+# Largest length of the first line of a block [bytes].
 _LINE: Final = 1 << 10
 
 
 class Blocks(Database):
-    """Base class for a `Database` that reads a text file of blocks; the class finds the complete states.
+    """Base class for a `Database` that reads a text file of blocks; it finds the complete states.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ class Blocks(Database):
         The last block if the file ends within it: it is a state only after ``admit_rest``.
     """
 
-    # Smallest number of equal blocks for which the positions of differing bytes are stored, to save memory.
+    # Shorter sequences of equal blocks do not store the positions of differing bytes, to save memory.
     many = 64
-    # Number of printed numbers that are converted at once; they fit into the processor's cache.
+    # Number of printed numbers that are converted at a time; these numbers fit into the processor cache.
     batch = 1 << 14
 
     def __init__(
@@ -85,7 +85,7 @@ class Blocks(Database):
         self._data = make_content(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        # The sequences are stored in packed form, so that a file with many different blocks does not fill the memory.
+        # The sequences are packed, so that a file with many different blocks does not fill the memory.
         self._runs = array("q")
         data = self._data
         # The function below must not refer to self, because a reference cycle would keep the file open.
@@ -94,7 +94,7 @@ class Blocks(Database):
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
         self._compared = grammar.compare_all
-        # True once a request has compared a part of each block.
+        # True once a request has compared part of each block.
         self._trusted = False
         # Bits that vary between the blocks of a long sequence of equal blocks, keyed by the start of the sequence.
         self._varied: dict[int, Bytes] = {}
@@ -139,7 +139,7 @@ class Blocks(Database):
         if tuple(names) == self._asked_ahead:
             # The copied numbers are used only once, because the caller keeps the result.
             taken, self._ahead = self._ahead, taken
-        # The operating system allocates the memory of zeros only when it is written.
+        # The operating system allocates the memory of an array of zeros only when something is written to it.
         values = np.zeros((self.states, len(names)))
         is_scattered = np.ones(self.states, bool)
         row = 0
@@ -166,7 +166,7 @@ class Blocks(Database):
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Use the incomplete last block of a file as a state if it contains these numbers and a further line."""
+        """Use the incomplete last block of a file as a state if it contains these numbers and one more line."""
         if self.rest is None:
             return
         offsets = [
@@ -184,7 +184,7 @@ class Blocks(Database):
         )
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return the place where a later read can begin: the newest state with the third-to-last printed time.
+        """Return the position at which a later read can begin: the newest state with the third-to-last printed time.
 
         The states after it tell whether the last one is complete, and which of those with the same printed time is the
         newest.  A last state of which only the needed lines are there, as `admit_rest` takes it, is not complete.
@@ -239,7 +239,7 @@ class Blocks(Database):
         )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Raise FormatError, with its line, for the first of the values (states, len(names)) that is not a number."""
+        """Raise FormatError, with the line, for the first value (states, len(names)) that is not a number."""
         odd = np.isnan(values)
         if not odd.any():
             return
@@ -277,7 +277,7 @@ class Blocks(Database):
     # The methods below find the blocks of the file.
 
     def _walk(self) -> None:
-        """Find all sequences of blocks, without incomplete blocks."""
+        """Find all sequences of complete blocks."""
         self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
@@ -305,7 +305,7 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        """Return True if a block is complete: it contains the number with which the previous block ends.
+        """Return True if a block is complete, i.e. contains the number with which the previous block ends.
 
         If there is no previous block, the grammar decides.
         """
@@ -325,7 +325,7 @@ class Blocks(Database):
     def _known(
         self, position: int, recent: list[tuple[int, int]]
     ) -> tuple[int, int, int] | None:
-        """Return example, stride and count of the blocks at ``position`` if their layout is a recent one; else None."""
+        """Return example, stride and count of the blocks at ``position`` if their layout is recent, otherwise None."""
         start = self._grammar.start
         for example, stride in recent:
             if self.text(position + stride, len(start)) == start:
@@ -350,7 +350,7 @@ class Blocks(Database):
         return position, stride, self._count(position, position, stride)
 
     def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
-        """Return the recent example block that the last block of the file resembles, or the last block itself."""
+        """Return the recent example block that the last block of the file resembles; otherwise, this last block."""
         alike = (
             example
             for example, stride in recent
@@ -384,7 +384,7 @@ class Blocks(Database):
         return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
-        """Count the blocks that resemble their example; store their varying bits, and copy the numbers needed first."""
+        """Count the blocks that resemble their example; store their varying bits and the numbers requested ahead."""
         varied = np.zeros_like(literal)
         fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
@@ -429,7 +429,7 @@ class Blocks(Database):
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        # The character after the last number is compared, too.
+        # The comparison includes the character after the last number.
         end = int(offsets.max()) + self._grammar.width + 1
         text = layout.literal[first:end]
         return (
@@ -438,7 +438,7 @@ class Blocks(Database):
         )
 
     def _is_even(self) -> bool:
-        """Return True if all blocks except the last have the same size, and the blocks at both file ends are alike."""
+        """Return True if all blocks except the last have the same size, and the first and the last block are alike."""
         runs = list(self)
         if not runs:
             return True
@@ -481,5 +481,5 @@ def _compute_starts(run: Stretch, first: int, end: int) -> Addresses:
 
 
 def _name_field(name: Hashable) -> str:
-    """Return the name of a field for use in a message."""
+    """Return the name of a field for a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
-# Label of the energy of springs, which is always needed and is therefore read in advance.
+# Label of the spring energy, which is read in advance because it is always needed.
 _SPRINGS: Final = "spring and damper energy"
 _START: Final = b" time".ljust(32, b".")
 # Number of bytes at the start of a file that contain the header and the first state.
 _NEAR: Final = 4096
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
-# The last line of a state in all known glstat files; mass scaling may add lines after it.
+# Last line of a state in all known glstat files; mass scaling may add lines after it.
 _LAST: Final = "time per zone cycle.(nanosec)"
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-# Pattern of a value. Each rigid wall has a line of its own, with the number of the wall after the value.
+# Pattern of a value. Each rigid wall has a separate line, with the number of the wall after the value.
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")
 
 # Pattern of the variable text in other lines: numbers, and the element that controls the time step.
@@ -51,7 +51,7 @@ _CHANGING: Final = re.compile(
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the start of a file, looks like a glstat; a header without states is enough."""
+    """Return True if ``data``, the start of a file, looks like a glstat; a header without states is sufficient."""
     if b"\n" + _START in data or data.startswith(_START):
         return True
     _, version, begin = read_head_of_listing(data)
@@ -60,7 +60,7 @@ def recognises(data: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
-    """Open each file as a restart segment of the run; an incomplete last state must have the selected lines."""
+    """Open each file as a restart segment of the run; an incomplete last state must contain the selected lines."""
     return [
         Glstat(source.data, source.name, selection.energy or (_ENERGY,))
         for source in sources
@@ -96,7 +96,7 @@ class Glstat(Blocks):
             self.notes += (
                 "the file has no header; everything before its first time line was left out",
             )
-        # False if a line is missing in some states but present in others.
+        # For each line, False if some states lack it although others have it.
         self._even = True
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -105,7 +105,7 @@ class Glstat(Blocks):
         """Return the values of the line ``name``, shape (n,); raise FormatError unless every state has it once."""
         if name not in self._columns:
             wanted = [name]
-            # A request for another line is usually followed by more requests.
+            # A request for a further line is usually followed by more requests.
             if self._even:
                 names = dict.fromkeys((*self.channels, name))
                 wanted = [label for label in names if label not in self._columns]
@@ -124,7 +124,7 @@ class Glstat(Blocks):
         return dict(zip(names, map(freeze, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
-        """Return the labels of all lines with values, except that of the time."""
+        """Return the labels of all lines with values, except the time."""
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}
@@ -139,11 +139,11 @@ class Glstat(Blocks):
 def _describe_glstat_block(
     block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
 ) -> tuple[dict[str, int], str]:
-    """Return the offsets of a block's values, keyed by label, and its last label; UNSURE for a truncated value."""
+    """Return the offsets of a block's values, keyed by label, and its last label; UNSURE marks a truncated value."""
     fields: dict[str, int] = {}
     name, end, is_mixed = "", 0, False
     for line in lines:
-        # A truncated line within the block may belong to another state.
+        # A truncated line inside the block may belong to another state.
         is_mixed |= name in fields and b"..." in block[end : line.start()]
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         end = line.end()
@@ -164,7 +164,7 @@ def _describe_glstat_block(
 
 
 def _has_last_line(layout: BlockLayout) -> bool:
-    """Return True if a block has the line that ends a state."""
+    """Return True if a block contains the line that ends a state."""
     return _LAST in layout.fields
 
 

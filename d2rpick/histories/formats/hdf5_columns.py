@@ -28,13 +28,13 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(
     rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
 )
-# First characters of the names of groups without histories: PyTables index trees, MATLAB references.
+# First characters of the names of groups without histories, such as PyTables index trees and MATLAB references.
 _BOOKKEEPING: Final = ("_i_", "#")
 _ERF_BLOCK: Final = "/erfblock"
-# Largest number of columns of a table without column names that is still read.
+# Tables without column names are read if they have at most this number of columns.
 _WIDEST: Final = 64
 
-# Largest dataset that is copied, as a fraction of the file [-]; a view would keep the whole file in memory.
+# Largest dataset that is copied, as a fraction of the file size [-]; a view would keep the whole file in memory.
 _LARGE: Final = 1 / 4
 
 
@@ -58,7 +58,7 @@ class Column(NamedTuple):
 
     @property
     def is_time(self) -> bool:
-        """True if the name of the column means a time; the name in ``time/value`` is ``time``."""
+        """True if the name of the column denotes a time; the name in ``time/value`` is ``time``."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
@@ -89,7 +89,7 @@ class Column(NamedTuple):
 
 
 def check_data(dataset: h5py.Dataset, source: str) -> None:
-    """Raise FormatError if the type of a dataset is damaged, or if data are missing, which h5py reads as zeros."""
+    """Raise FormatError if the type of a dataset is damaged, or if data are missing, which h5py would read as zeros."""
     _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
     if too_much := describe_unpacked_excess(stored, dataset.nbytes):
@@ -144,7 +144,7 @@ def _list_number_types(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
 
 @cache
 def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
-    """Return the integer types and floating-point types that HDF5 defines."""
+    """Return the integer and floating-point types that HDF5 defines."""
     import h5py
 
     names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
@@ -157,7 +157,7 @@ def _list_standard_types() -> tuple[h5py.h5t.TypeID, ...]:
 
 def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; a large contiguous dataset is returned as a view of ``content``."""
-    # Data in chunks or in other files have no offset in this file.
+    # Data in chunks or in external files have no offset in this file.
     start = dataset.id.get_offset()
     if start is None:
         return dataset[()]
@@ -168,7 +168,7 @@ def _read_values(dataset: h5py.Dataset, content: bytes) -> Any:
 
 
 def check_finite(values: Any, path: str, source: str) -> Samples:
-    """Return ``values`` as read-only doubles that callers can share; raise FormatError unless all are finite."""
+    """Return ``values`` as read-only doubles, which callers can share; raise FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
     is_finite = np.isfinite(numbers)
     if not is_finite.all():
@@ -184,7 +184,7 @@ def find_columns(file: h5py.File) -> tuple[Column, ...]:
     import h5py
 
     columns: list[Column] = []
-    # These groups have a layout with a reader of its own, which reads them completely.
+    # These groups have a layout with a separate reader, which reads them completely.
     read_groups: list[str] = []
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -238,7 +238,7 @@ def _list_dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
 def _list_matrix_columns(
     name: str, dataset: h5py.Dataset, titles: list[str]
 ) -> Iterator[Column]:
-    """Yield the columns of a matrix along the axis that has one title per column, or else along the shorter axis."""
+    """Yield the columns of a matrix along the axis that has one title per column, otherwise along the shorter axis."""
     rows, width = dataset.shape
     if rows == width:
         return
@@ -274,7 +274,7 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
         return
-    # Path of the variable, without the name of the zone (such as ZONE1).
+    # Path of the variable without the zone name (such as ZONE1).
     variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]
     yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
     of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
@@ -292,7 +292,7 @@ def _list_erf_columns(name: str, block: h5py.Group) -> Iterator[Column]:
 
 
 def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
-    """Return the column names that Exodus stores next to a matrix: ``name_glo_var`` next to ``vals_glo_var``."""
+    """Return the column names that Exodus stores next to a matrix, as in ``name_glo_var`` for ``vals_glo_var``."""
     import h5py
 
     leaf = (dataset.name or "").rpartition("/")[2]
@@ -314,7 +314,7 @@ def _read_exodus_titles(dataset: h5py.Dataset) -> list[str]:
 def _list_compound_columns(
     name: str, dataset: h5py.Dataset, index_name: str
 ) -> Iterator[Column]:
-    """Yield a column for each member of a compound type or each component; pandas names them in an attribute."""
+    """Yield a column for each member of a compound type, or for each component, which pandas names in an attribute."""
     if len(dataset.shape) != 1:
         return
     base = name.removesuffix("/table")
@@ -337,7 +337,7 @@ def _list_compound_columns(
 
 
 def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Yield the columns of a data frame in the "table" store of pandas."""
+    """Yield the columns of a data frame stored in the "table" format of pandas."""
     info = bytes(_read_attribute_text(group.attrs.get("info")), "utf-8")
     match = _PICKLED_INDEX_NAME.search(info)
     index_name = match[1].decode() if match else "index"
@@ -345,7 +345,7 @@ def _list_table_columns(name: str, group: h5py.Group) -> Iterator[Column]:
 
 
 def _list_frame_columns(name: str, group: h5py.Group) -> Iterator[Column]:
-    """Yield the columns of a data frame in the "fixed" store of pandas: the index, and blocks of one type."""
+    """Yield the columns of a data frame stored in the "fixed" format of pandas: the index, and blocks of one type."""
     index = group["axis1"]
     yield from _list_index_column(name, index)
     for number in range(int(group.attrs["nblocks"])):
@@ -395,7 +395,7 @@ _PANDAS: Final = {
 
 
 def _read_attribute_text(value: object) -> str:
-    """Return an attribute as text, whatever its type; empty if it is not text."""
+    """Return an attribute of any type as text; empty if it is not text."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):
@@ -404,7 +404,7 @@ def _read_attribute_text(value: object) -> str:
 
 
 def _split_titles(value: object) -> list[str]:
-    """Return the names in an array of strings, or in one string separated by commas."""
+    """Return the names in an array of strings or in a single comma-separated string."""
     if isinstance(value, np.ndarray) and value.ndim == 1:
         return [_read_attribute_text(entry) for entry in value.tolist()]
     text = _read_attribute_text(value)

@@ -1,4 +1,4 @@
-"""Read HDF5 files: time and energy columns of any layout, and binouts saved by lasso-python.
+"""Read HDF5 files: time and energy columns in any layout, and binouts saved by lasso-python.
 
 A file with the branches of a binout is treated as a saved binout. Of any other file, columns are chosen by their
 paths; if the user chooses no column, the only column that fits is used, and if several fit the message lists them.
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_MANY: Final = 12  # Largest number of columns that a message lists.
+_MANY: Final = 12  # Largest number of columns listed in a message.
 _BRANCHES: Final = ("glstat", "matsum")
-# Exceptions that h5py raises for a damaged file.
+# Exceptions that h5py raises on damaged files.
 _DAMAGED: Final = (
     OSError,
     RuntimeError,
@@ -54,17 +54,17 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
-# Offset of the end-of-file address in superblocks of version 0 to 3. All writers use 8-byte addresses.
+# Offset of the end-of-file address in superblock versions 0 to 3. All writers use 8-byte addresses.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# Time-out of a read, in addition to 1 s per 100 kB [s]. A longer read means a cyclic B-tree in a damaged file.
+# Time-out of a read in addition to 1 s per 100 kB [s]; a longer read indicates a cyclic B-tree in a damaged file.
 _SECONDS: Final = 60
 _SLOWEST: Final = 100_000  # Slowest expected reading speed [bytes/s].
 _USER_BLOCK: Final = 512  # Number of bytes that MATLAB writes before the HDF5 content.
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data`` is the start of an HDF5 file; MATLAB puts 512 bytes before the signature."""
+    """Return True if ``data`` is the start of an HDF5 file; MATLAB writes 512 bytes before the signature."""
     return SIGNATURE in (data[:8], data[512:520])
 
 
@@ -76,7 +76,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 def _open_leg(source: Source, selection: Selection) -> Database:
     """Open one file as a saved binout or as a file of columns."""
     _import_library(source.name)
-    # The file is read into memory: if it changed on disk, the library could crash on a mixture of two versions.
+    # The file is read into memory: if it changed on disk, the library could crash on a mix of two versions.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     if not selection.time and not selection.energy:
@@ -87,7 +87,7 @@ def _open_leg(source: Source, selection: Selection) -> Database:
 
 
 def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
-    """Open the glstat and matsum branches that lasso-python saved; empty for a file of another layout."""
+    """Open the glstat and matsum branches that lasso-python saved; empty for a file with another layout."""
     with _open_hdf5(file, source) as opened:
         return {
             name: PartGroup(file, source, opened, name)
@@ -99,7 +99,7 @@ def _open_branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
 
 
 class Columns(Database):
-    """The columns of an HDF5 file of any layout, keyed by path, as a `Database` without parts."""
+    """The columns of an HDF5 file with any layout, keyed by path, as a `Database` without parts."""
 
     format = "hdf5"
     named_by_people = True
@@ -120,7 +120,7 @@ class Columns(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The only column whose name means an internal energy, or else the only column besides the time.
+        """The only column whose name denotes an internal energy, otherwise the only column besides the time.
 
         Raise a FormatError that lists all columns if there is no such column.
         """
@@ -181,7 +181,7 @@ class Columns(Database):
             )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """Return the precisions of the stored number types of the times and of these columns."""
+        """Return the precisions with which the times and these columns are stored."""
         energies = [
             _find_named_column(name, self._columns, self.source) for name in names
         ]
@@ -193,7 +193,7 @@ class Columns(Database):
 
     @cached_property
     def _time_column(self) -> Column:
-        """The selected time column, or the time in the group nearest to the energy."""
+        """The selected time column, or the time in the group closest to the energy."""
         if self._named_time:
             return self._named_time
         if self._energies:
@@ -284,7 +284,7 @@ class PartGroup(Database):
         return values[:, [part_ids.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
-        """Return the dataset ``name`` in this ``shape``; axes of length 1 may be missing in the file."""
+        """Return the dataset ``name`` in this ``shape``; the file may omit axes of length 1."""
         dataset = group[name]
         check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [
@@ -297,7 +297,7 @@ class PartGroup(Database):
 
 
 def _read_parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
-    """Return the parts in the order of the columns; titles belong to ``legend_ids``, which may have another order."""
+    """Return the parts in the order of the columns; titles belong to ``legend_ids``, which may be in another order."""
     check_data(group["ids"], source)
     titles: dict[int, str] = {}
     if "legend" in group and "legend_ids" in group:
@@ -326,7 +326,7 @@ def _read_line(group: h5py.Group, name: str) -> str:
 
 
 def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Column:
-    """Return the column with this path; otherwise raise FormatError, with a similar path if there is one."""
+    """Return the column with this path; otherwise raise FormatError with a similar path, if any."""
     matching = [column for column in columns if column.path == path.strip("/")]
     near = ""
     if not matching:
@@ -337,7 +337,7 @@ def _find_named_column(path: str, columns: Sequence[Column], source: str) -> Col
 def _find_only_energy(
     columns: Sequence[Column], time: Column | None, source: str
 ) -> Column:
-    """Return the only column whose name means an internal energy, or the only column besides a time."""
+    """Return the only column whose name denotes an internal energy, or the only column besides a time."""
     paths = [column.path for column in columns]
     fitting = [columns[index] for index in find_internal_energies(paths)]
     if not fitting:
@@ -354,7 +354,7 @@ def _find_only_energy(
 
 
 def _find_only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
-    """Return the time in the group of the energy, or in the nearest enclosing group."""
+    """Return the time in the group of the energy, or in the closest enclosing group."""
     group = energy.group
     while True:
         fitting = [
@@ -370,7 +370,7 @@ def _find_only_time(columns: Sequence[Column], energy: Column, source: str) -> C
 def _choose_only_column(
     fitting: Sequence[Column], columns: Sequence[Column], purpose: str, source: str
 ) -> Column:
-    """Return the only matching column; otherwise raise FormatError with the columns to choose from."""
+    """Return the only matching column; otherwise raise FormatError with the columns from which to choose."""
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
@@ -393,7 +393,7 @@ def _import_library(source: str) -> None:
 
 @contextmanager
 def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
-    """Open the file; convert any error of h5py for a damaged file into a FormatError."""
+    """Open the file; convert any h5py error for a damaged file into a FormatError."""
     import h5py
 
     try:
@@ -406,7 +406,7 @@ def _open_hdf5(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
         ) from error
 
 
-# The functions below find damage that would make the library crash or loop endlessly.
+# The functions below find damage that would make the library crash or loop forever.
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
@@ -439,7 +439,7 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
-    """Raise FormatError if the size of a file differs from the size stated in its header."""
+    """Raise FormatError if the size of a file differs from the size that its header states."""
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -466,7 +466,7 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
 
 
 def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) -> None:
-    """Read all data that could crash the library, write the message of a FormatError to ``write_end``, and exit."""
+    """Read all data that could crash the library, write any FormatError message to ``write_end``, and exit."""
     try:
         import faulthandler
         import resource
@@ -487,7 +487,7 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, write_end: int) ->
 
 
 def _read_all_data(file: BinaryIO, source: str) -> None:
-    """Read the description of all data, and all data in chunks; raise FormatError if a limit is exceeded."""
+    """Read the description of all data, and all chunked data; raise FormatError if a limit is exceeded."""
     import h5py
 
     size = _head_and_size(file)[1]

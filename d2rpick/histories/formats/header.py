@@ -1,4 +1,4 @@
-"""Read the lines above the rows of a table: names and units of the columns, and the title of a curve."""
+"""Read the lines above the rows of a table: column names and units, and the title of a curve."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from d2rpick.histories.names import is_unit, normalise_name
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-_SHORT: Final = 60  # Largest number of characters of a line that a message quotes.
-# First columns in the output of OpenRadioss' th_to_csv, in every version of that program.
+_SHORT: Final = 60  # Largest number of characters of a line quoted in a message.
+# First columns that every version of OpenRadioss' th_to_csv writes.
 # In some versions of th_to_csv, there are more or fewer names than columns (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
     *(
@@ -36,12 +36,12 @@ _TH_TO_CSV: Final = (
         "hourglassenergy",
     ),
 )
-# Number of columns used (time and first value) if another program wrote more names than columns.
+# Number of columns used (time and first value) if another program writes more names than columns.
 _SURE_WITHOUT: Final = 2
 
 
 class Header(NamedTuple):
-    """Names and units of the columns, if the file contains them; only the first ``sure`` names are certain."""
+    """Column names and units, if the file contains them; only the first ``sure`` names are certain."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ def read_header(
     title = ""
     if len(names) > 1 and not names[-1]:
         names = names[:-1]
-        # LS-PrePost writes a line of titles before the line "Time," or "Time,A8874,".
+        # LS-PrePost writes a line of titles above the line "Time," or "Time,A8874,".
         if len(rows) > 1:
             title = next((cell for cell in reversed(rows[-2]) if cell), "")
     if columns == 2 and len(names) == 1 and is_time(names[0]):
@@ -92,7 +92,7 @@ def read_header(
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        # In files from 3DEXPERIENCE, the third name is the name of the curve.
+        # In files from 3DEXPERIENCE, the third name is the curve name.
         title = " ".join(filter(None, names[2:]))
         sure = None
     return Header(tuple(names), units, title, sure)
@@ -119,7 +119,7 @@ def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
 
 
 def _join_rows_of_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
-    """Join rows of names, from the last row upwards, until all names differ; empty if one row is enough.
+    """Join rows of names, from the last row upwards, until all names differ; empty if one row suffices.
 
     Examples
     --------
@@ -147,14 +147,14 @@ def _join_names(upper: str, lower: str) -> str:
 
 
 def _fit(cells: Sequence[str], columns: int) -> list[str]:
-    """Return one name per column, without empty cells at the end; empty if there are too few or too many names."""
+    """Return one name per column, without trailing empty cells; empty if there are too few or too many names."""
     if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
         return []
     return list(cells[:columns])
 
 
 def _fill_from_left(cells: Sequence[str]) -> list[str]:
-    """Repeat each name, except a time, in the empty cells after it, which a spreadsheet had merged with it."""
+    """Repeat each name, except a time, in the empty cells after it, with which a spreadsheet had merged it."""
     filled = [cells[0]]
     for cell in cells[1:]:
         filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
@@ -164,7 +164,7 @@ def _fill_from_left(cells: Sequence[str]) -> list[str]:
 def _split_rows(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> Iterator[list[str]]:
-    """Yield the cells of each header line; a quoted name may contain a line end."""
+    """Yield the cells of each header line; a quoted name may contain a line break."""
     pending = ""
     for line in lines:
         if not pending and is_skipped(line):
@@ -178,7 +178,7 @@ def _split_rows(
 
 
 def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
-    """Split a header line into names, which may contain single blanks; a line that does not match is one title."""
+    """Split a header line into names, which may contain single spaces; a line that does not match is one title."""
     if separator is not None:
         return split_cells(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -191,7 +191,7 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
 def _find_commented_names(
     lines: Sequence[str], separator: str | None, columns: int
 ) -> tuple[str, ...]:
-    """Return the names in the last comment line, as written by numpy.savetxt, if they name each column and a time."""
+    """Return the names in the last comment line, as numpy.savetxt writes it, if they name each column and a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []
     return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()

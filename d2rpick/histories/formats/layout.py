@@ -1,4 +1,4 @@
-"""Find the layout of a table in a text: separator, decimal sign, first row, names and units."""
+"""Find the layout of a table in a text file: separator, decimal sign, first row, names and units."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-# Text at the beginning of the LS-DYNA listings d3hsp and messag.
+# Text at the start of the LS-DYNA listings d3hsp and messag.
 _LISTING_OF_LS_DYNA: Final = "Livermore Software"
-# Pairs of separator (None: blanks) and decimal sign, in the order in which they are tried.
-# If separator and decimal sign are both a comma, rows can be read only if their numbers are in quotes.
+# Pairs of separator (None: spaces) and decimal sign, in the order in which they are tried.
+# If the separator and the decimal sign are both commas, a row is readable only if its numbers are in quotes.
 _FORMS = (
     *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
     *((",", "."), (",", ","), (None, "."), (None, ",")),
 )
 
-# Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator cannot be part of a number.
+# Pattern of the line ``sep=;`` that spreadsheets write above a table; a separator must not be part of a number.
 _SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
-# Number of lines in which the first row is expected at the first attempt.
+# Number of lines in which the first row is sought in the first attempt.
 _LOOK_AT = 60
 _LINES_SEARCHED = (_LOOK_AT, 600, HEAD)
 
@@ -69,7 +69,7 @@ class Layout(NamedTuple):
         return self.columns if self.sure is None else self.sure
 
     def number(self, cell: str) -> float | None:
-        """Return the number in a cell, or None."""
+        """Return the number in a cell; None if the cell does not contain a number."""
         return parse_cell(cell, self.decimal, self.thousands)
 
     def plain(self, cell: str) -> str:
@@ -78,7 +78,7 @@ class Layout(NamedTuple):
         return plain.replace(self.decimal, ".")
 
     def name(self, column: int) -> str:
-        """Return the name of a column in the file, or its number if it has no name."""
+        """Return the name of a column in the file, or the column number if it has no name."""
         name = self.names[column] if column < min(len(self.names), self.trusted) else ""
         return name or f"column {column + 1}"
 
@@ -87,14 +87,14 @@ class Layout(NamedTuple):
         return f"{self.name(column)}: {self.title}" if self.title else self.name(column)
 
     def unit(self, column: int) -> str:
-        """Return the unit of a column in the file; empty if the file contains none."""
+        """Return the unit of a column in the file; empty if the file gives none."""
         if self.units:
             return self.units[column].strip("()[]")
         return find_unit(self.names[column]) if self.names else ""
 
 
 def number_duplicates(names: Sequence[str], kind: str) -> list[str]:
-    """Add the column number to names that occur more than once, such as "IE (column 2)".
+    """Add the column number to names that occur more than once, as in "IE (column 2)".
 
     Examples
     --------
@@ -137,14 +137,14 @@ def find_layout(text: Text) -> Layout:
 
 
 def _add_header(table: Layout, header: Header) -> Layout:
-    """Add the names, units and title of a header to a layout."""
+    """Add the names, units and title in a header to a layout."""
     return table._replace(
         names=header.names, units=header.units, title=header.title, sure=header.sure
     )
 
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator proved by ``rows``, in which some cells are numbers only with this separator."""
+    """Add the thousands separator without which some cells of ``rows`` would not be numbers."""
     odd = [
         cell
         for row in rows
@@ -157,7 +157,7 @@ def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
 
 
 def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
-    """Return the error for a text that contains no table; the error quotes the first likely row or the first line."""
+    """Return the error for a text without a table; it quotes the first likely row or the first line."""
     numbered = [
         (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
     ]
@@ -179,7 +179,7 @@ def _report_no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
-    """Search for the rows in few lines, then in more lines; thousands separators are tried in a second pass."""
+    """Search for the rows in a few lines, then in more lines; thousands separators are tried in a second pass."""
     candidates = (
         (number, line)
         for number, line in enumerate(lines)
@@ -200,7 +200,7 @@ def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | N
 def _find_rows(
     sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool
 ) -> Layout | None:
-    """Return the layout in which most lines are rows, which may contain words; else a layout with only numbers."""
+    """Return the layout in which most lines are rows, which may contain words; otherwise a layout with only numbers."""
     forms: Sequence[tuple[str | None, str]]
     if separator:
         forms = [(separator, decimal) for decimal in ".," if separator != decimal]
@@ -246,7 +246,7 @@ def _find_rows(
 def _find_numbers_in_row(
     cells: list[str], form: Layout, only_numbers: bool
 ) -> tuple[bool, ...]:
-    """Return, for each cell of a row, whether it is a number or missing; empty if the line is not a row."""
+    """Return, for each cell of a row, whether it is a number or marks a missing one; empty if the line is not a row."""
     # Most lines have only one cell, because most of the separators tried are wrong.
     if len(cells) < 2:
         return ()
@@ -265,7 +265,7 @@ def _find_numbers_in_row(
 
 
 def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
-    """Return True if a row has the usual number of cells, and numbers wherever most rows have numbers."""
+    """Return True if a row has the usual number of cells, and numbers wherever most rows have them."""
     return len(kind) == len(common) and all(
         is_number or not is_commonly_number
         for is_number, is_commonly_number in zip(kind, common, strict=True)
@@ -275,7 +275,7 @@ def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
 def _refuse_odd_rows(
     source: str, lines: Sequence[str], first: int, table: Layout
 ) -> None:
-    """Raise FormatError if a line above the rows begins with a number, because such a line is not a header."""
+    """Raise FormatError if a line above the rows begins with a number, because a header line never does."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split_cells(line, table.separator)
         if cells and table.number(cells[0]) is not None:

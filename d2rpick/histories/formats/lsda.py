@@ -1,4 +1,4 @@
-"""Read LSDA, the container of LS-DYNA's binout: directories of typed variables, found by reading all records.
+"""Read LSDA, the container format of LS-DYNA's binout: directories of typed variables, found by reading all records.
 
 The file begins with the length of its header, the sizes of length, offset, command and type fields, the byte order
 (1: little-endian) and the float format. Records follow, each of length, command and body:
@@ -36,7 +36,7 @@ DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
 _TABLES: Final = range(4, 8)  # Record types of symbol tables and of their entries.
-_LONGEST: Final = 1 << 32  # Upper limit for the length of a symbol table [bytes].
+_LONGEST: Final = 1 << 32  # Largest length of a symbol table [bytes].
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {
@@ -56,10 +56,10 @@ _TYPES: Final = {
 _HEAD: Final = 1 << 9
 _AROUND: Final = 1 << 16
 
-# Smallest number of repetitions for which comparing arrays is faster than reading the records.
+# With at least this number of repetitions, comparing arrays is faster than reading the records.
 _WORTH: Final = 64
 
-# Pattern of the names of state directories: d and the number of the state (18 digits fit into an int64).
+# Pattern of the names of state directories: d and the state number (18 digits fit into an int64).
 _STATE: Final = re.compile(rb"(?:^|/)d(\d{1,18})$")
 
 
@@ -80,7 +80,7 @@ class DirectoryLayout(NamedTuple):
 
 
 class _Form(NamedTuple):
-    """The records of a directory as one integer, which is quick to compare with that of another directory.
+    """The records of a directory as one integer, which is quick to compare with another directory.
 
     ``heads`` are the records without their values; ``fixed`` are these bytes at their positions, ``mask`` selects
     them from ``length`` bytes.
@@ -175,11 +175,11 @@ class Lsda:
         return np.asarray(fields.view(dtype).reshape(positions.shape))
 
     def states(self, branch: str) -> NDArray[np.int64]:
-        """Return number, start and layout of each state of a branch, in the order of the file, shape (n, 3)."""
+        """Return the number, start and layout of each state of a branch, in file order, shape (n, 3)."""
         return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def find_resume_point(self, branches: Collection[str]) -> ResumePoint:
-        """Return the place where a later read can begin: the earliest of the second-to-last states of all branches.
+        """Return the position at which a later read can begin: the earliest second-to-last state of all branches.
 
         The head repeats the metadata of all wanted branches, each behind a change to its directory.
         """
@@ -216,7 +216,7 @@ class Lsda:
         return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
-        """Read the records after a byte offset, and collect the directories of the requested branches."""
+        """Read the records after a byte offset, and collect the requested directories."""
         data = self.data
         unpack = self._head.unpack_from
         head = self._head.size
@@ -285,7 +285,7 @@ class Lsda:
         return _Directory(_resolve_path(path, text.decode()), number, end)
 
     def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
-        """Return True if the file was truncated in the record ``last_bytes``; otherwise, that record is damaged.
+        """Return True if the file was truncated within the record ``last_bytes``; False if this record is damaged.
 
         Records of a state have the heads of the last state, but symbol tables differ from each other.
         """
@@ -338,7 +338,7 @@ class Lsda:
         return DirectoryLayout(variables, frozenset(doubled))
 
     def _form(self, heads: tuple[bytes, ...]) -> _Form:
-        """Return the form of a directory whose records have these headers."""
+        """Return the layout of a directory whose records have these headers."""
         mask, fixed = bytearray(), bytearray()
         for head in heads:
             values = bytes(self._head.unpack_from(head)[0] - len(head))
@@ -347,7 +347,7 @@ class Lsda:
         return _Form(heads, len(mask), int.from_bytes(mask), int.from_bytes(fixed))
 
     def _same_again(self, directory: _Directory) -> _Form | None:
-        """Return the form of the branch's last state if this state has the same records, otherwise None."""
+        """Return the layout of the branch's last state if the current state has the same records, otherwise None."""
         if not directory.is_state or directory.branch not in self._forms:
             return None
         form = self._forms[directory.branch][1]
@@ -391,7 +391,7 @@ class Lsda:
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
-        """Compare records one stride apart; return True if searching for repetitions is worthwhile."""
+        """Compare records one stride apart; return True if a search for repetitions is worthwhile."""
         head = self._head.size
         stride = position - previous
         first = self.data[previous : previous + head]
@@ -441,7 +441,7 @@ def _read_lsda_header(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if a file with these first bytes is an LSDA container; never raises.
+    """Return True if a file with these first bytes is an LSDA container. This function never raises.
 
     Examples
     --------

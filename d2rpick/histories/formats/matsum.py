@@ -1,4 +1,4 @@
-"""Read LS-DYNA's matsum: one block per state, with three or four lines for each part.
+"""Read LS-DYNA's matsum, which has one block per state with three or four lines per part.
 
 The lines of a part begin with ``mat.#=``. Numbers have 13 columns after their name and an equals sign; which names
 there are depends on the version. A legend at the top lists the titles by part number. A part may be in some states
@@ -38,7 +38,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
-# Quantities that are adjacent in the file, so that they are read together.
+# Quantities that are adjacent in the file and therefore read together.
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
@@ -47,8 +47,8 @@ _AXES: Final = (
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
-_MAT: Final = "mat.#"  # Text at the beginning of the lines of a part.
-# Part number 0, printed as "mat.#=    0", which stands for lumped masses and their kinetic energy.
+_MAT: Final = "mat.#"  # Text at the start of the lines of a part.
+# Part number 0, printed as "mat.#=    0"; it stands for lumped masses and their kinetic energy.
 _LUMPED: Final = 0
 # Placeholder for a part number that is damaged, or too long for its columns.
 _UNREADABLE: Final = -1
@@ -61,7 +61,7 @@ _LEGEND: Final = re.compile(
 _ENTRY: Final = re.compile(
     rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE
 )
-_LONGEST: Final = 1 << 24  # Upper limit for the length of a legend [bytes].
+_LONGEST: Final = 1 << 24  # Largest length of a legend [bytes].
 _LINE: Final = re.compile(
     rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$",
     re.MULTILINE,
@@ -71,13 +71,13 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 _ID: Final = re.compile(
     rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
 )
-# Pattern of the numbers in those lines that may vary between states.
+# Pattern of the numbers that may differ from state to state.
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
 def recognises(data: bytes) -> bool:
-    """Return True if ``data``, the start of a file, looks like a matsum; a legend without states is enough."""
+    """Return True if ``data``, the start of a file, looks like a matsum; a legend without states is sufficient."""
     if b"\n mat.#=" in data:
         return b"\n" + _START in data
     _, legend, states = data.partition(b"\n{END LEGEND}")
@@ -90,7 +90,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
 
 
 class Matsum(Blocks):
-    """One matsum file, as a ``Database`` without channels of the whole model.
+    """One matsum file, as a ``Database`` without whole-model channels.
 
     Raises FormatError if it has neither a head nor a state, or if a time is not a number.
     """
@@ -118,7 +118,7 @@ class Matsum(Blocks):
         super().__init__(data, source, grammar)
         self.refuse_foreign()
         self.part_time = self.numbers([_TIME])[:, 0]
-        # Columns that were read together with requested columns.
+        # Columns that were read together with the requested columns.
         self._together: dict[tuple[str | int, ...], Samples] = {}
         present = self._present()
         self.parts = tuple(
@@ -147,7 +147,7 @@ class Matsum(Blocks):
             )
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._together:
-            # A request for one component is usually followed by requests for the other components.
+            # A request for one component is usually followed by requests for the others.
             together = _AXES if quantity in _AXES else (quantity,)
             names = [
                 (id_, QUANTITIES[component]) for id_ in ids for component in together
@@ -160,7 +160,7 @@ class Matsum(Blocks):
         return self._together.pop(wanted)
 
     def _present(self) -> Counter[int]:
-        """Count the states that contain each part, in the order in which the parts appear."""
+        """Count the states that contain each part, in the order in which the parts occur."""
         states = Counter[int]()
         for run in self:
             names = self.layout(run.example, run.stride).fields
@@ -203,7 +203,7 @@ def _read_legend(data: bytes | Content) -> dict[int, str]:
 
 
 class PartColumns(NamedTuple):
-    """Energies and momenta of one part for writing, all of the same shape (n,)."""
+    """Energies and momenta of one part to be written, each of shape (n,)."""
 
     title: str
     internal_energy: Samples
@@ -269,7 +269,7 @@ def _describe_matsum_block(
             doubled = (part, _MAT) in fields
             if doubled:  # If a part has two groups of lines, neither group is reliable.
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            # The offset includes the line end before the line.
+            # The offset includes the line ending before the line.
             fields[part, _MAT] = UNSURE if doubled else line.start() - 1
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())

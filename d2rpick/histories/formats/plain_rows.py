@@ -1,4 +1,4 @@
-"""Read uniform rows of numbers at once; the results equal those of `float`, whatever the pandas version."""
+"""Read uniform rows of numbers at once; the results equal those of `float` with any pandas version."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Samples
 
-_UNIT_SEPARATOR: Final = "\x1f"  # A control character that occurs in no table.
-# Largest relative error of the fast number parser of pandas, which counts leading zeros as digits [-].
+_UNIT_SEPARATOR: Final = "\x1f"  # A control character that does not occur in tables.
+# Largest relative error of pandas' fast number parser [-], which counts leading zeros as digits.
 _ROUNDED: Final = 1e-9
 
 
@@ -54,7 +54,7 @@ def read_plain_rows(
         table = read_table(piece, layout, chosen)
     except ValueError:
         return None
-    # bytes.count() is slow if the lines are short.
+    # bytes.count() is slow if lines are short.
     lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
     if table.shape != (lines, len(read_columns)):
         return None  # The parser skipped blank lines.
@@ -80,8 +80,8 @@ def _remove_quotes(piece: bytes, layout: Layout) -> bytes | None:
 def _read_with_numpy(
     piece: bytes, layout: Layout, columns: Sequence[int] | None
 ) -> Samples:
-    """Read rows of numbers with numpy, in the given columns or all columns; raise ValueError for other rows."""
-    # Numbers contain no character outside Latin-1.
+    """Read rows of numbers with numpy, in the given columns or in all columns; raise ValueError for other rows."""
+    # Numbers contain no characters outside Latin-1.
     lines = piece.decode("latin-1").split("\n")[:-1]
     if not lines[0].strip():
         # numpy skips blank lines, and warns if there are no other lines.
@@ -108,7 +108,7 @@ def _read_with_pandas(
         "quoting": QUOTE_NONE,
     }
     options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
-    # Since pandas 3.1, the default parser is as exact as `float`.
+    # Since pandas 3.1, the default parser has been as exact as `float`.
     if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:
         if columns is None and layout.separator:
             fast = pd.read_csv(
@@ -140,13 +140,13 @@ def read_exact_numbers(piece: bytes, separator: str, fast: Samples) -> Samples |
         ).reshape(fast.shape)
     except ValueError:
         return None
-    with np.errstate(invalid="ignore"):  # Numbers that are not finite never agree.
+    with np.errstate(invalid="ignore"):  # Non-finite numbers never count as equal.
         agrees = np.abs(exact - fast) <= _ROUNDED * np.abs(exact)
     return exact if bool(np.all(agrees)) else None
 
 
 def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Return True if all rows have the right number of cells, and either all or none end with a separator."""
+    """Return True if all rows have the right number of cells, and either all or none of them end with a separator."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     ends = signs == ord("\n")

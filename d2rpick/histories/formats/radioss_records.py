@@ -1,4 +1,4 @@
-"""Read the records of Radioss time histories in both file types: binary, and the text of ``/TFILE/3``.
+"""Read the records of Radioss time histories from binary files and from the text files of ``/TFILE/3``.
 
 A binary record is its length, its bytes and its length again, all big-endian. A record of text begins with a line
 ``ZZZZZEOR`` that gives its numbers of integers (I), characters (C) and reals (R); lines of fixed columns follow: ten
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-# Size of a binary number, and of the record length before and after each record [bytes].
+# Size of a binary number, and of the record length that precedes and follows each record [bytes].
 WIDTH: Final = 4
 # Size of the first record [bytes], which contains a code and a title of 80 bytes.
 RUN: Final = 84
@@ -34,9 +34,9 @@ _SHAPE: Final = re.compile(
     rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
 )
 _LONG, _SHORT = 10, 5  # Number of columns of an integer in the two text formats.
-# Fortran prints these characters in place of a number that is too long for its field.
+# Characters that Fortran prints in place of a number that is too long for its field.
 _STARS: Final = b"*" * _SHORT
-# Upper limit for the length of a header record, without its integers [bytes].
+# Maximum length of a header record, excluding its integers [bytes].
 _ROOM: Final = 1024
 # Number of characters of the run title in text files (binary files have 80).
 _RUN_TITLE: Final = 72
@@ -85,7 +85,7 @@ class Records:
         self._data, self.at = data, at
 
     def take(self) -> bytes | None:
-        """Return the next header record, and move on; None if there is no complete record."""
+        """Return the next header record and advance; None if there is no complete record."""
         begin = self.at + WIDTH
         if begin > len(self._data):
             return None
@@ -99,21 +99,21 @@ class Records:
         return self._data[begin:end]
 
     def size(self, count: int) -> int:
-        """Return the number of bytes of a record with ``count`` reals."""
+        """Return the number of bytes of a record that contains ``count`` reals."""
         return (count + 2) * WIDTH
 
     def place(self, number: int) -> int:
-        """Return the offset of a real in its record [bytes]; reals are counted from 0."""
+        """Return the offset of a real in its record [bytes]; the reals are counted from 0."""
         return (number + 1) * WIDTH
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
-        """Return the offset and the bytes of the length marks in every record with ``count`` reals."""
+        """Return the offset and the bytes of the length marks of every record with ``count`` reals."""
         length = INT.pack(count * WIDTH)
         return [(0, length), ((count + 1) * WIDTH, length)]
 
     def values(self, fields: Bytes) -> Samples:
-        """Decode bytes of shape (n, width) as reals of shape (n,); NaN for bytes that are not a number."""
-        # A NaN causes an error later, but only if the value is used.
+        """Decode bytes (n, width) as reals (n,); bytes that are not a number give NaN."""
+        # A NaN raises an error later, but only if the value is used.
         with np.errstate(invalid="ignore"):
             return fields.view(">f4").ravel().astype(np.float64)
 
@@ -138,7 +138,7 @@ class _TextRecords(Records):
             return None
         first, characters, last = (int(count or 0) for count in shape.group(1, 2, 3))
         begin = self.at + len(line) + len(self._line_end)
-        # The body ends at the next mark, because a title may contain line ends.
+        # The body ends at the next mark, because a title may contain line breaks.
         room = self._data[begin : begin + _ROOM + (_LONG + 1) * first]
         body, mark, _ = room.partition(self._line_end + _MARK)
         if not mark and not body.endswith(self._line_end):
@@ -188,7 +188,7 @@ class _TextRecords(Records):
 
     def values(self, fields: Bytes) -> Samples:
         values = parse_fortran_numbers(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
-        # A number with shifted or missing characters can often still be parsed, so columns 3 and 4 are checked.
+        # A number with shifted or missing characters can often still be parsed, so columns 3 and 4 are checked as well.
         values[(fields[:, 2] == ord(" ")) | (fields[:, 3] != ord("."))] = np.nan
         return values
 
@@ -212,7 +212,7 @@ def split_integers(record: bytes) -> tuple[int, ...]:
 
 
 def _pack_integers(text: bytes, count: int, width: int) -> bytes:
-    """Pack ``count`` integers of ``width`` columns; asterisks, which replace a material or property id, become 1."""
+    """Pack ``count`` integers of ``width`` columns; asterisks in place of a material or property id become 1."""
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))

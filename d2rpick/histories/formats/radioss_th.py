@@ -46,8 +46,8 @@ _TITLES: Final = (
     100,
 )
 
-# Global variables in the order of the file.
-# A file has the first 12 variables up to version 2024, the first 16 in version 2025, and all 22 since version 2026.
+# Global variables in file order.
+# A file has the first 12 variables up to version 2024, the first 16 in version 2025, and all 22 from 2026 on.
 _GLOBALS: Final = (
     "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum", "mass", "time_step",
     "rotation_energy", "external_work", "spring_energy", "contact_energy", "hourglass_energy",
@@ -63,16 +63,16 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-# Kind of a group of nodes; the codes of its displacement variables follow.
+# Type of a node group, followed by the codes of its displacement variables.
 _NODES: Final = 0
 _DISPLACEMENTS: Final = (1, 2, 3)
-# Kinds of groups with contact forces; the codes of their normal and tangential impulses follow.
+# Types of groups with contact forces, followed by the codes of their normal and tangential impulses.
 _TOUCHING: Final = {101: "interface", 102: "rigid wall"}
 _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
 
 class _Group(NamedTuple):
-    """A group with a history: its kind, the number of its members, and the codes of its variables.
+    """A group that has a history: its type, the number of its members, and the codes of its variables.
 
     ``named`` are number and title of each member; empty for a group of neither nodes, interfaces nor rigid walls.
     """
@@ -102,7 +102,7 @@ class _Head(NamedTuple):
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if a file with these first bytes is a time history; never raises.
+    """Return True if a file with these first bytes is a time history. This function never raises.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
 
 
 class TimeHistory(Database):
-    """One time history file as a `Database`; parts and whole model have the same times.
+    """One time history file as a `Database`; the parts and the whole model have the same times.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class TimeHistory(Database):
 
     @cached_property
     def digits(self) -> int:  # type: ignore[override]  # a property overrides a field
-        """Number of significant decimal digits of all numbers."""
+        """Number of significant decimal digits of all numbers in the file."""
         return self._records.digits(self.time)
 
     @cached_property
@@ -185,7 +185,7 @@ class TimeHistory(Database):
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
-        """Forces of the interfaces and rigid walls that have a history (cards /TH/INTER and /TH/RWALL)."""
+        """Forces of the interfaces and rigid walls that have histories (cards /TH/INTER and /TH/RWALL)."""
         return tuple(
             self._force_of(record, group, member)
             for record, group in self._list_groups()
@@ -199,14 +199,14 @@ class TimeHistory(Database):
         return tuple(self._displacement_columns)
 
     def node_displacements(self, ids: Sequence[int]) -> Samples:
-        """Return the displacements of some nodes since the start of the run, shape (n, len(ids), 3)."""
+        """Return the displacements of the given nodes since the start of the run, shape (n, len(ids), 3)."""
         places = [self._displacement_columns[id_] for id_ in ids]
         moved = [self._columns(record, columns) for record, columns in places]
         return np.stack(moved, axis=1)
 
     @cached_property
     def _displacement_columns(self) -> dict[int, tuple[int, list[int]]]:
-        """Index of the record with the displacements of each node, and their three columns in that record."""
+        """Index of the record that contains the displacements of each node, and their three columns in that record."""
         places: dict[int, tuple[int, list[int]]] = {}
         for record, group in self._list_groups():
             if group.kind == _NODES and {*_DISPLACEMENTS} <= {*group.variables}:
@@ -235,7 +235,7 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return the place where a later read of the file can begin: the second-to-last complete state."""
+        """Return the position at which a later read of the file can begin: the second-to-last complete state."""
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
@@ -246,7 +246,7 @@ class TimeHistory(Database):
         return self.time
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """Return a variable of some parts, shape (n, len(ids)).
+        """Return a variable of the given parts, shape (n, len(ids)).
 
         Raises
         ------
@@ -315,7 +315,7 @@ class TimeHistory(Database):
         return states, (stop,) if bytes_left else ()
 
     def _silent_parts(self) -> tuple[str, ...]:
-        """Return a note on parts that have no variables."""
+        """Return a note on parts without variables."""
         silent = [part.id for part in self._head.parts if part not in self.parts]
         if not silent:
             return ()
@@ -326,13 +326,13 @@ class TimeHistory(Database):
 
 
 class _HeadRecords:
-    """Reads the header records of a time history, one after another."""
+    """Reads the header records of a time history one after another."""
 
     def __init__(self, records: Records, file_size: int, source: str) -> None:
         self._records = records
         self._most = file_size
         self._source = source
-        # Length of the titles, equal in all records [bytes]; 0 until the first title is read.
+        # Length of the titles [bytes]; it is the same in all records, and 0 until the first title has been read.
         self._title = 0
 
     def head(self) -> _Head:
@@ -340,7 +340,7 @@ class _HeadRecords:
         run = self._next(RUN)
         version = clean_text(self._next(80))
         hierarchy = self._next()
-        # Newer releases write a record with the number of additional records.
+        # Newer releases write a record that gives the number of additional records.
         if len(hierarchy) == WIDTH:
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
@@ -380,7 +380,7 @@ class _HeadRecords:
     def _parts(
         self, count: int
     ) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
-        """Read the parts (id, title, subset, material, property and number of variables), and then the variables."""
+        """Read the parts (id, title, subset, material, property and number of variables) and their variables."""
         described: dict[int, Part] = {}
         columns: dict[tuple[int, str], int] = {}
         values = 0
@@ -404,7 +404,7 @@ class _HeadRecords:
         return tuple(described.values()), columns, values
 
     def _subset(self) -> int:
-        """Skip a subset and its lists of children, parts and variables; return its number of variables."""
+        """Skip a subset and its lists of children, parts and variables, and return its number of variables."""
         children, parts, variables = (
             self._count(n)
             for n in split_integers(self._titled(5)[2 * WIDTH : 5 * WIDTH])
@@ -414,7 +414,7 @@ class _HeadRecords:
         return variables
 
     def _group(self) -> _Group:
-        """Read a group, its elements and its list of variables."""
+        """Read a group with its elements and its list of variables."""
         record = self._titled(5)
         kind, elements, variables = (
             INT.unpack_from(record, WIDTH * word)[0] for word in (1, 3, 4)
@@ -438,11 +438,11 @@ class _HeadRecords:
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
-        """Read a record of ``count`` integers; if ``count`` is 0, the file has no such record."""
+        """Read a record of ``count`` integers; if ``count`` is 0, the file has no record."""
         return split_integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
-        """Return a count from the file; raise FormatError if the file is too short for it."""
+        """Return a count from the file; raise FormatError if the file is too short for this count."""
         if not 0 <= number <= self._most:
             raise self._broken("a count")
         return number
@@ -457,7 +457,7 @@ class _HeadRecords:
         return record
 
     def _broken(self, expected: str) -> FormatError:
-        """Return the error for a header that lacks expected content."""
+        """Return the error for a header without the expected content."""
         at = self._records.at
         problem = f"{self._source}: {expected} was expected in the head of the time history near byte {at}"
         return FormatError(f"{problem}; the file is cut or damaged, copy it again")

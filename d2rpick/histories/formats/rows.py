@@ -1,4 +1,4 @@
-"""Read the numbers in the rows of a table. Uniform rows are read in large blocks, other rows line by line."""
+"""Read the numbers in the rows of a table; uniform rows are read in large blocks, other rows line by line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ReadColumns(NamedTuple):
-    """Columns (rows,) of a table in the requested order, and notes on ignored lines below the table."""
+    """Columns (rows,) of a table in the requested order, and notes on lines that were ignored below the table."""
 
     columns: list[Samples]
     notes: tuple[str, ...]
@@ -57,7 +57,7 @@ def read_columns(
 def find_line(
     text: Text, begin: int, layout: Layout, time_column: int, state: int
 ) -> int:
-    """Return the number of the line that contains a state; states are counted from 0, lines from 1."""
+    """Return the line number of a state; states are counted from 0, lines from 1."""
     for numbers, _ in _read_tables(
         text, begin, _Curve(text.name, layout, [time_column])
     ):
@@ -93,7 +93,7 @@ def _read_tables(
 
 
 class _Below(NamedTuple):
-    """The first line below the table that is no row: its number and text, and the error to raise if rows follow."""
+    """The first line below the table that is not a row: its number and text, and the error to raise if rows follow."""
 
     line: int
     text: str
@@ -101,7 +101,7 @@ class _Below(NamedTuple):
 
 
 class _Curve:
-    """Progress of the reader of a table: the states read so far, and the lines found below the table."""
+    """State of the table reader: the states read so far, and the lines found below the table."""
 
     def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
         self.layout, self.used = layout, used
@@ -113,14 +113,14 @@ class _Curve:
         # States read so far from the current block of rows.
         self._current: list[list[float]] = []
         self._below: _Below | None = None
-        # Number of states of the table that are repeated below the table.
+        # Number of states of the table that occur again below it.
         self._repeated = 0
-        # Line number of the first repeated state below the table.
+        # Line number of the first state that occurs again below the table.
         self._repeated_from = 0
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on ignored lines below the table."""
+        """Notes on lines that were ignored below the table."""
         if self._below is None:
             return ()
         start = quote_start(self._below.text)
@@ -142,7 +142,7 @@ class _Curve:
             self._current.clear()
 
     def stops_before(self, time: float) -> bool:
-        """Return True if a state at this time belongs to another curve, or lies below the table."""
+        """Return True if a state at this time belongs to another curve or lies below the table."""
         starts_again = self._gap and self._before is not None and time <= self._before
         return self._ended or starts_again or self._below is not None
 
@@ -172,7 +172,7 @@ class _Curve:
                 yield number, state
 
     def _read_state(self, number: int, row: str) -> list[float] | None:
-        """Return the values of the used columns in a row; None if all of them are empty in a row after the first."""
+        """Return the values of the used columns in a row; None if all are empty and the row is not the first."""
         where = f"{self._name}:{number}"
         cells = _split_row(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
@@ -183,7 +183,7 @@ class _Curve:
         ]
 
     def _is_below(self, row: str) -> bool:
-        """Return True if a line is no row, begins with a word and has no time, as lines below a table do."""
+        """Return True if a line is not a row, begins with a word and has no time, as lines below a table do."""
         cells = split_cells(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
         return (
@@ -204,7 +204,7 @@ class _Curve:
             )
 
     def _check_repeated(self, number: int, state: Sequence[float]) -> None:
-        """Raise FormatError unless a row below the table repeats the next row of the table."""
+        """Raise FormatError unless the rows below a table repeat the rows of that table in their order."""
         self.keep_piece()
         if len(self._read) > 1:
             self._read = [np.concatenate(self._read)]

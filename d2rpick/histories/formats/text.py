@@ -1,4 +1,4 @@
-"""Read the lines of a text file with any encoding and line ends, and the precision of its printed numbers."""
+"""Read the lines of a text file with any encoding and line endings, and determine the precision of its numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8: Final = b"\xef\xbb\xbf"
 
-# Number of lines from which encoding, separator and header of a text are determined.
+# Number of lines from which the encoding, separator and header of a text are determined.
 HEAD: Final = 10_000
 
 # Pattern of a number, with groups for the digits before and after the decimal point, and for the exponent.
@@ -30,7 +30,7 @@ _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 # Number of significant digits that preserve every double.
 _LONGEST = 17
 _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-# Smallest number of digits of a lossless format; a double preserves all numbers with 15 digits.
+# Smallest number of digits that indicates a lossless format; a double preserves all numbers with 15 digits.
 _FULL = 15
 
 
@@ -41,22 +41,22 @@ class Text:
     """
 
     # The constants of this class limit how many lines and bytes are read at once.
-    # Number of lines from which encoding, separator and header of the text are determined.
+    # Number of lines from which the encoding, separator and header of the text are determined.
     top = HEAD
-    # Number of bytes that are read at once, so that their cells fit into the processor's cache.
+    # Number of bytes that are read at a time; their cells fit into the processor cache.
     piece = 1 << 17
-    # Largest size of a text of which all fields are used to determine the printed precision [bytes].
+    # If a text has at most this size [bytes], the printed precision is determined from all fields.
     short = 1 << 16
-    # Number of lines that are sampled at the start, at the end and in between of a longer text.
+    # Number of lines that are sampled at the start, at the end and in between if a text is longer.
     some = 100
-    # Number of bytes of a large text that are read at once; it is high, because each call of pandas costs milliseconds.
+    # Number of bytes of a large text that are read at a time; it is high, because each pandas call takes milliseconds.
     large = 1 << 22
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _read_plain_text(source, self.piece)
         self._check_lines()
-        # Offset after the last line that has a line end [bytes].
+        # Offset after the last line that has a line ending [bytes].
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self.unended = self._text(self._data[self._end :])
 
@@ -67,7 +67,7 @@ class Text:
 
     @property
     def is_short(self) -> bool:
-        """True if ``head`` contains all lines except an unterminated last line."""
+        """True if ``head`` contains all lines, apart from an unterminated last line."""
         return len(self._first) <= self.top
 
     @cached_property
@@ -100,23 +100,23 @@ class Text:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
             if not end and begin + size < self._end:
-                size *= 2  # A single line is longer than the block.
+                size *= 2  # This line is longer than a block.
                 continue
             yield piece[:end] or piece + b"\n"
             begin += end or len(piece)
         self._data.check()
 
     def lines(self, begin: int) -> Iterator[str]:
-        """Yield the lines that start at or after byte ``begin``, without their line ends."""
+        """Yield the lines that start at or after byte ``begin``, without their line endings."""
         for piece in self.pieces(begin):
             yield from self.rows(piece)
 
     def rows(self, piece: bytes) -> list[str]:
-        """Return the lines of a block of text, without their line ends."""
+        """Return the lines of a block of text, without their line endings."""
         return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
-        """Return lines after byte ``begin``: all of a short text, else some at the start, at the end and in between."""
+        """Return lines after byte ``begin``: all of a short text, or some at the start, at the end and in between."""
         data = self._data
         end = self._end
         count = self.some
@@ -132,7 +132,7 @@ class Text:
             last = data.rfind(b"\n", 0, max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (count - i) + last * i) // count for i in range(count))
-        # Each line is read as soon as its offset is known, while that part of the file is in memory.
+        # Each line is read as soon as its offset is known, while this part of the file is still in memory.
         addresses = chain(
             starts, (data.find(b"\n", position) + 1 for position in between)
         )
@@ -159,14 +159,14 @@ class Text:
 
 
 def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
-    """Return the text with line feeds only and without a byte order mark, and its encoding."""
+    """Return the text with line feeds only and without a byte order mark, and the encoding of the file."""
     data = source.data
     if not isinstance(data, bytes):
         pieces = (
             data[address : address + piece] for address in range(0, len(data), piece)
         )
         if all(map(_is_plain, pieces)):
-            return data, "latin-1"  # Latin-1 contains ASCII.
+            return data, "latin-1"  # ASCII is a subset of Latin-1.
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
@@ -181,7 +181,7 @@ def _read_plain_text(source: Source, piece: int) -> tuple[Content, str]:
 
 
 def _is_plain(data: bytes) -> bool:
-    """Return True if data is ASCII text without carriage returns and null bytes."""
+    """Return True if data are ASCII text without carriage returns and null characters."""
     return data.isascii() and b"\r" not in data and b"\0" not in data
 
 
@@ -268,7 +268,7 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
         return False
     decimals, width = shapes.pop()
     padded = any(part[2].endswith("0") for part in parts[1:] if part)
-    # These are the first two digits of 324, the largest exponent of a double.
+    # A two-digit exponent of at most 32 may be the beginning of 324, the largest exponent of a double.
     longest_start = 32
     exponent = parts[0][3] if parts[0] else None
     doubtful = (
@@ -291,20 +291,20 @@ def _count_significant_digits(field: str) -> int:
 
 
 def _find_fixed_decimals(fields: Sequence[str]) -> int | None:
-    """Return the number of decimals that all fields without an exponent share; None if the numbers differ."""
+    """Return the number of decimals common to all fields without an exponent; None if the numbers differ."""
     decimals = _decimals(fields[0]) if fields else 0
     are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
     return decimals if are_alike else None
 
 
 def _decimals(field: str) -> int:
-    """Return the number of decimals of a number without exponent; 0 for any other field."""
+    """Return the number of decimals of a number without an exponent; 0 for any other field."""
     parts = _PARTS.fullmatch(field)
     return len(parts[2]) if parts and parts[3] is None else 0
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
-    """Return True if the times are equally spaced with a step that needs fewer decimals than ``decimals``."""
+    """Return True if the times are equally spaced with an interval that needs fewer decimals than ``decimals``."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
