@@ -410,11 +410,16 @@ def extract_columns(
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return the selected columns of a run, all quantities that are known at the same times, and notes on them.
 
-    ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
-    the momentum that shows the flight, each of shape (n,).
+    ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, ``not_chosen_part_<id>`` for each part
+    that flies with them, then quantities of the whole model and the momentum that shows the flight, each of shape (n,).
     """
+    from d2rpick.base.errors import list_names
     from d2rpick.choice.question import Reference
-    from d2rpick.choice.td.flights import list_momentum_columns
+    from d2rpick.choice.td.flights import (
+        list_flying_parts_not_chosen,
+        list_momentum_columns,
+    )
+    from d2rpick.histories.table_parts import name_energy_of_part_not_chosen
 
     history = Reference.of(run, selection).history
     table = {"time": history.time, "internal_energy": history.energy}
@@ -424,9 +429,24 @@ def extract_columns(
             f"part_{part.id}": column
             for part, column in zip(history.parts, energies.T, strict=True)
         }
-    return table | run.quantities(history.time) | _list_model_columns(
-        history
-    ) | list_momentum_columns(history), history.notes
+    notes = history.notes
+    not_chosen = list_flying_parts_not_chosen(history)
+    energies_not_chosen = history.evidence.internal_energies(not_chosen)
+    if not_chosen and energies_not_chosen is not None:
+        names = [name_energy_of_part_not_chosen(part) for part in not_chosen]
+        table |= dict(zip(names, energies_not_chosen.values.T, strict=True))
+        others = list_names([part.name for part in not_chosen])
+        note = (
+            f"internal_energy is that of the chosen parts; momentum and mass include {others}, not chosen but flying "
+            f"with them, with the energy in {list_names(names)}"
+        )
+        notes = (*notes, note)
+    return (
+        table
+        | run.quantities(history.time)
+        | _list_model_columns(history)
+        | list_momentum_columns(history)
+    ), notes
 
 
 def _list_model_columns(history: History) -> dict[str, Samples]:

@@ -70,7 +70,8 @@ _MOST_REFUSED = 3
 class PairVerdict(AnswerAtTd):
     """The answer of ``verify``: the measures of one pair, and the reasons for and against it.
 
-    ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``computed`` is the energy of the finished
+    ``tr_ok`` and ``td_ok`` are None if the record does not show it.  ``remarks`` are those of the ``reasons`` that do
+    not count against the pair, or that the residual says as well.  ``computed`` is the energy of the finished
     switched run, if there is one.
     """
 
@@ -81,6 +82,7 @@ class PairVerdict(AnswerAtTd):
     admissible: bool
     reasons: tuple[str, ...]
     cautions: tuple[Caution, ...]
+    remarks: tuple[str, ...] = ()
     switched: Comparison | None = None
     health: Health | None = None
     computed: History | None = None
@@ -105,11 +107,13 @@ class PairVerdict(AnswerAtTd):
     def _decide(self, better: Pair | None) -> Decision:
         """Return the verdict on the pair; ``better`` is a better pair, or None if no better pair is known."""
         unknown = () if self.reasons else ("no evidence shows that tr suits this td",)
-        objections = () if self.admissible else self.reasons or unknown
+        objections = [text for text in self.reasons if text not in self.remarks]
         decision = decide(
             self.situation,
             self.candidate,
-            objections=objections,
+            objections=() if self.admissible else objections or unknown,
+            is_admissible=self.admissible,
+            best_residual=self._best_residual,
             better=better,
             cure_of_objections=CHECK_SWITCHED_RUN
             if self._is_refuted
@@ -119,6 +123,15 @@ class PairVerdict(AnswerAtTd):
             return decision
         quality = omit_comparison(decision.quality)
         return decision._replace(quality=quality, is_compared=True)
+
+    @cached_property
+    def _best_residual(self) -> float | None:
+        """The residual of the best tr at this td [-], if that of the pair is poor; None if it is unknown."""
+        residual = self.candidate.residual
+        if residual is None or residual <= POOR_RESIDUAL:
+            return None
+        pair = next(rank_candidates([self.situation])).pair
+        return None if pair is None else pair.residual
 
     @cached_property
     def better(self) -> Pair | None:
@@ -208,8 +221,23 @@ def verify_at(situation: Situation, tr: float) -> PairVerdict:
         td_ok=td_ok,
         admissible=bool(judged.recommendable[0]),
         reasons=(*candidate.notes, *(excess.message for excess in exceeded)),
+        remarks=_list_remarks(judged, candidate),
         cautions=(*warn_about_td(situation), *warn_about_place(situation, tr)),
     )
+
+
+def _list_remarks(judged: Candidates, candidate: Candidate) -> tuple[str, ...]:
+    """Return the notes on a candidate that are no reason against it, or that say again how large its error is."""
+    objections = list_separate_objections(judged, candidate)
+    return tuple(note for note in candidate.notes if note not in objections)
+
+
+def list_separate_objections(
+    judged: Candidates, candidate: Candidate
+) -> tuple[str, ...]:
+    """Return the objections to a candidate; those to the size of its error only if its residual does not show it."""
+    is_shown = candidate.residual is not None and candidate.residual > POOR_RESIDUAL
+    return judged.list_objections(max(candidate.rank - 1, 0), of_error=not is_shown)
 
 
 def _check_order(tr: float, td: float) -> None:
@@ -339,10 +367,16 @@ class PairSuggestion(AnswerAtTd):
 
     def decision_on(self, candidate: Candidate) -> Decision:
         """Return the verdict on one of the candidates by the rules of ``verify``."""
-        objections = () if candidate.admissible else candidate.notes
+        objections = list_separate_objections(self.candidates, candidate)
         limits = list_exceeded_limits(self.situation, candidate)
         messages = (excess.message for excess in limits)
-        return decide(self.situation, candidate, objections=(*objections, *messages))
+        return decide(
+            self.situation,
+            candidate,
+            objections=(*objections, *messages),
+            is_admissible=candidate.admissible,
+            best_residual=self.recommended.residual if self.recommended else None,
+        )
 
     @property
     def quality(self) -> Quality | None:
@@ -400,7 +434,8 @@ def compare_in_flight(
 
     The flight is searched only if another time may be better, and no better pair is known yet.
     """
-    needs_other_times = decision.objections or any(
+    is_refused = decision.objections or decision.grade != decision.quality.grade
+    needs_other_times = is_refused or any(
         cause.needs_other_times for cause in decision.quality.causes
     )
     if decision.grade == GOOD or decision.better or not needs_other_times:
@@ -658,7 +693,13 @@ def _refuse_switched(situation: Situation) -> None:
 def _add_choice_in_flight(answer: PairSuggestion) -> PairSuggestion:
     """If the pair for a given td is not good, add the result of searching its flight to the answer."""
     best, decision = answer.chosen, answer.decision
-    if best is None or decision is None or decision.better:
+    if best is None:
+        choice = _choose_in_flight(answer.situation)
+        is_usable = choice and choice.decision and choice.decision.grade != POOR
+        if choice and is_usable:
+            return replace(answer, better_pair=choice.recommended)
+        return answer
+    if decision is None or decision.better:
         return answer
     decision = compare_in_flight(decision, answer.situation, best)
     if decision.better:

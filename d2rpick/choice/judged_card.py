@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from d2rpick.choice.answers import verify_run
 from d2rpick.choice.pair.grades import DO_NOT_USE
 from d2rpick.deck.printing import DEFAULT, SOLVERS, find_solver, print_cards
+from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -138,7 +139,13 @@ def _list_card_remarks(
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: these windows are done and not judged again."
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
-        yield "The internal energy is that of the whole model, not of the switched parts alone."
+        if READERS[history.energy_format].solver:
+            yield "The internal energy is that of the whole model, not of the switched parts alone."
+        else:
+            yield (
+                "The table does not name the parts of the internal energy: it must be that of the switched parts, "
+                "and of all parts that vibrate with them."
+            )
     for verdict in verdicts:
         if len(verdicts) > 1:
             which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"

@@ -199,6 +199,10 @@ def _format_usage_error(error: click.UsageError) -> str:
     """Return the message of a usage error; for an unknown option, it suggests the options that resemble it most."""
     if not isinstance(error, click.NoSuchOption) or not error.possibilities:
         return error.format_message()
+    if error.option_name == "--tr":
+        return (
+            f"{error.message.rstrip('.')}. d2rpick verify judges a given tr with its td"
+        )
     import difflib
 
     likeness = {

@@ -89,9 +89,10 @@ def info(request: Request, output: Output) -> None:
 def extract(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
-    With several parts, a column part_<id> follows for each.  Other columns are quantities of the whole model, such as
-    total internal energy, kinetic energy, external work and momentum.  If the files contain part momenta, the momentum
-    is the sum over the parts that fly together with the chosen parts.
+    With several parts, a column part_<id> follows for each.  A column not_chosen_part_<id> follows for each other part
+    that flies with the chosen parts, so that the table gets the verdict of the run.  Other columns are
+    quantities of the whole model, such as total internal energy, kinetic energy, external work and momentum.  If the
+    files contain part momenta, the momentum is the sum over the parts that fly together with the chosen parts.
 
     Examples
     --------

@@ -146,6 +146,8 @@ def study(
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in rows):
         click.get_current_context().exit(2)
+    if answer.is_choice_refused and not output.exit_zero:
+        tell("d2rpick: exit code 1: the verdict on the common tr is 'do not use'")
     output.finish(objection=answer.objection)
 
 

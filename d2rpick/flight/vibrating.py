@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.table_parts import CHOSEN_ENERGY
 
 if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
@@ -34,12 +35,9 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     ----------
     history : History
     flight : Flight
-        The flight with all parts that fly together; if the flight names no parts, the result is empty.
+        The flight with all parts that fly together; if neither it nor a table names parts, the result is empty.
     """
-    if flight.parts is None or history.parts is None:
-        return Beside()
-    chosen = {part.id for part in history.parts}
-    not_chosen = tuple(part for part in flight.parts if part.id not in chosen)
+    not_chosen = _list_parts_not_chosen(history, flight)
     energies = history.evidence.internal_energies(not_chosen) if not_chosen else None
     if energies is None:
         return Beside()
@@ -51,6 +49,18 @@ def find_vibrating_parts(history: History, flight: Flight) -> Beside:
     ranges = np.ptp(values[inside], axis=0)
     notable = ranges > _HARDLY * float(np.ptp(energy_in_flight))
     return Beside(tuple(compress(not_chosen, notable)), float(ranges[notable].sum()))
+
+
+def _list_parts_not_chosen(history: History, flight: Flight) -> tuple[Part, ...]:
+    """Return the parts that fly with the chosen ones but were not chosen, or those that a table names as left out."""
+    if history.parts is None:
+        # A sum of several columns, or another column, may contain the energies of the parts that were left out.
+        is_of_chosen = history.channel == CHOSEN_ENERGY
+        return history.evidence.not_chosen if is_of_chosen else ()
+    if flight.parts is None:
+        return ()
+    chosen = {part.id for part in history.parts}
+    return tuple(part for part in flight.parts if part.id not in chosen)
 
 
 def extract_kinetic_energy(

@@ -237,13 +237,15 @@ class Given:
     ``momenta`` are those of the parts, then of the whole model, as far as they are written. ``balance`` are the
     energies of the whole model; None if only the internal energy is written. ``masses`` are those of the parts with
     known momenta, in the order of the parts, NaN if unknown; None if no mass is known. ``forces`` are those of contacts
-    and rigid walls. ``written`` is all data of a switched run, whose parts are unknown while they were rigid.
+    and rigid walls. ``not_chosen`` are the parts that a table names as left out of its internal energy.
+    ``written`` is all data of a switched run, whose parts are unknown while they were rigid.
     """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
     forces: tuple[ContactForce, ...] = ()
+    not_chosen: tuple[Part, ...] = ()
     written: Given | None = None
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  subclasses use the argument

@@ -37,6 +37,10 @@ from d2rpick.histories.names import (
 from d2rpick.histories.samples import compute_median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 from d2rpick.histories.table_forces import find_forces
+from d2rpick.histories.table_parts import (
+    find_parts_not_chosen,
+    read_energies_of_parts_not_chosen,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -521,6 +525,16 @@ class _Written(Given):
         return self._run.contact_forces
 
     @cached_property
+    def not_chosen(self) -> tuple[Part, ...]:
+        """Parts that a table names as left out of its internal energy."""
+        database = self._find_table_with_others()
+        return find_parts_not_chosen(database) if database else ()
+
+    def _find_table_with_others(self) -> Legs | None:
+        """Return the first table that names parts as left out of its internal energy; None if no table does."""
+        return next(filter(find_parts_not_chosen, self._run.databases), None)
+
+    @cached_property
     def balance(self) -> Balance | None:
         """Energies of the whole model."""
         from d2rpick.histories.balance import read_terms
@@ -533,6 +547,9 @@ class _Written(Given):
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:
         """Return the internal energies of the given parts; None if the files do not contain them."""
+        table = self._find_table_with_others()
+        if table is not None and not self._run.parts:
+            return Track(table.time, read_energies_of_parts_not_chosen(table, parts))
         values = give_if_written(lambda: self._run.part_energies(parts))
         return None if values is None else Track(self._run.part_time, values)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.pair.decision import join_cures
 from d2rpick.choice.pair.grades import GOOD
 
 if TYPE_CHECKING:
@@ -66,7 +67,11 @@ def explain_grade(grade: Grade, decision: Decision) -> str:
         for cause in causes
         if not (decision.better is not None and cause.needs_other_times)
     ]
-    cures = "; ".join(dict.fromkeys(map(decision.specify_cure, curable)))
+    cures = join_cures(
+        cure
+        for cure in map(decision.specify_cure, curable)
+        if cure not in decision.cure
+    )
     return f". Reason: {reasons}{f'. To improve: {cures}' if cures else ''}"
 
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.pair.candidates import Pair
+    from d2rpick.choice.pair.decision import Decision
     from d2rpick.choice.pair.situation import Situation
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History
@@ -112,16 +113,40 @@ def name_step_to_card(
     return f"print the cards with {line}{hint}"
 
 
+def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
+    """Return the step that judges a better pair."""
+    line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
+    return f"judge the better pair with {line}"
+
+
+def _keep_td(times: Sequence[str]) -> Sequence[str]:
+    """Return the words of ``--td`` or ``--td-window`` among those of the times; empty without either."""
+    for name, values in (("--td", 1), ("--td-window", 2)):
+        if name in times:
+            position = times.index(name)
+            return times[position : position + 1 + values]
+    return ()
+
+
 def name_step_after_refusal(
     situation: Situation,
     better: Pair | None,
     question: RepeatedQuestion,
     otherwise: str,
+    decision: Decision | None = None,
 ) -> str:
-    """Return the step after a pair that cannot be used: a better pair, more parts, or ``otherwise``."""
+    """Return the step after a pair that cannot be used: to a better pair, to more parts, or ``otherwise``.
+
+    If the ``decision`` rests on what the record lacks, no other pair helps, so the step is to improve the record.
+    """
+    if decision is not None and decision.needs_better_record:
+        line = write_command(question, "suggest", *_keep_td(question.times))
+        return f"improve the record as said above, then judge it again with {line}"
+    if decision is not None and decision.is_outside_flight and better is None:
+        line = write_command(question, "suggest")
+        return f"choose both times in the flight with {line}"
     if better is not None:
-        line = write_command(question, "suggest", "--td", f"{better.td:.6g}")
-        return f"judge the better pair with {line}"
+        return name_step_to_better_pair(better, question)
     missing = situation.together.not_chosen.parts if question.parts else ()
     if missing:
         parts = (*(situation.history.parts or ()), *missing)

@@ -86,7 +86,7 @@ _LOOKS: Final[
     "trade_off": (
         trade_off.list_answer_lines,
         lambda answer: trade_off.build_offer_table(
-            trade_off.select_offers(answer, _FEW_ROWS)
+            trade_off.select_offers(answer, _FEW_ROWS), answer
         ),
     ),
     "plan": (
@@ -334,7 +334,8 @@ def trade_off_page(answer: TradeOff, record: page.PageContext) -> str:
         build_section(
             "Pairs that nothing beats",
             _build_starred_table(
-                "Pairs", *select_known_columns(*trade_off.build_offer_table(best))
+                "Pairs",
+                *select_known_columns(*trade_off.build_offer_table(best, answer)),
             ),
             build_pairs(trade_off.list_offer_reasons(best)),
             hidden,

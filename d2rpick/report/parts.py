@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.parts.switchable_parts import PartRow
     from d2rpick.report.formats import DisplayOptions
 
-# Column names of the table of sets, and of the two tables of parts.
+# Name of a deck in a command if the user has to give it.
+_SOME_DECK: Final = "DECK"
+# Column names of the table of sets, and of the two tables into which the columns for parts are divided.
 SETS = (
     "set",
     "parts",
@@ -406,16 +408,24 @@ def list_next_step(answer: Parts, question: RepeatedQuestion) -> list[tuple[str,
     """Return the next command: ``plan`` with the recommended set, or ``explore`` if the pair of the set is unusable."""
     best = answer.recommended
     if best is None:
-        parts: Sequence[str] = ()
-        command = "plan"
-        if answer.inventory is not None:
-            command = "info"
-            question = RepeatedQuestion(files=question.files)
-    else:
-        parts = [format_part_ranges(best.parts)]
-        is_refused = best.decision is not None and best.decision.verdict == DO_NOT_USE
-        command = "explore" if is_refused else "plan"
+        return [("next", _name_step_without_set(answer, question))]
+    parts = [format_part_ranges(best.parts)]
+    is_refused = best.decision is not None and best.decision.verdict == DO_NOT_USE
+    command = "explore" if is_refused else "plan"
     return [("next", write_command(question, command, new_parts=parts))]
+
+
+def _name_step_without_set(answer: Parts, question: RepeatedQuestion) -> str:
+    """Return the step if no set is recommended: to the deck that is missing, or to the verdict on all parts."""
+    # The options name a deck that was not used.
+    of_files = RepeatedQuestion(files=question.files)
+    if answer.inventory is None:
+        line = write_command(of_files, "parts", "--deck", _SOME_DECK)
+        return f"judge the parts with {line} (main deck of this run instead of {_SOME_DECK})"
+    if not any(row.flight and row.flight.flies is not None for row in answer.rows):
+        line = write_command(question, "plan", new_parts=["all"])
+        return f"if all parts fly together, plan their switching with {line}"
+    return write_command(of_files, "info")
 
 
 def _explain_no_part(answer: Parts) -> str:

@@ -251,7 +251,9 @@ def give_plan_sentence(plan: RunPlan) -> str:
     spans = " and ".join(
         "from {:.6g} to {:.6g}".format(*window) for window in plan.windows
     )
-    text = f"{_describe_use(plan)}: make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
+    use = _describe_use(plan)
+    make = "planned nevertheless (--min-quality): " if use.endswith(DO_NOT_USE) else ""
+    text = f"{use}: {make}make rigid {spans}, {plan.rigid_fraction:.0%} of the simulated time"
     if plan.run_time_share is not None:
         text += f"; saves {format_saved_share(plan.run_time_share)}"
     if not waiting:
@@ -340,7 +342,9 @@ def _list_step_without_window(
     assert answer is not None
     better = answer.decision.better if answer.decision else None
     otherwise = f"compare all td with {write_command(question, 'explore')}"
-    step = name_step_after_refusal(answer.situation, better, question, otherwise)
+    step = name_step_after_refusal(
+        answer.situation, better, question, otherwise, answer.decision
+    )
     return [("next", step)]
 
 

@@ -260,9 +260,7 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
         errors = [error for error in common.errors if error is not None]
         heading = VERDICTS[answer.grade] if answer.grade else heading
         runs = f"{answer.judged} of {format_number_of_runs(len(answer.runs))}"
-        shared = (
-            f"common tr = {common.tr:g}, for {runs}, error {_format_error_span(errors)}"
-        )
+        shared = f"common tr = {common.tr:g}, for {runs}, {_name_error(answer)} {_format_error_span(errors)}"
         shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
@@ -271,6 +269,14 @@ def list_outcome(answer: StudyOfRuns) -> list[tuple[str, str]]:
         ("td", describe_td(answer)),
         ("own tr", own_tr),
     ]
+
+
+def _name_error(answer: StudyOfRuns) -> str:
+    """Return the name of the errors at the common tr, which depend on the basis of the runs."""
+    bases = {row.basis for row in answer.runs if row.judged}
+    if "energy" not in bases:
+        return "residual"
+    return "level error" if bases == {"energy"} else "error"
 
 
 def _format_error_span(errors: Sequence[float]) -> str:
@@ -343,7 +349,9 @@ def list_next_step(
         step = f"look at the first of the worst runs with {line}"
     elif answer.td is None:
         earliest = min(row.td for row in judged if row.td is not None)
-        line = write_command(question, "study", "--td", f"{earliest:.6g}")
+        readable = tuple(row.source for row in answer.runs if row.judged)
+        of_readable = question._replace(files=readable)
+        line = write_command(of_readable, "study", "--td", f"{earliest:.6g}")
         step = f"choose one td for all runs, for example the earliest, with {line}"
     else:
         times = ("--tr", f"{answer.common.tr:.6g}", "--td", f"{answer.td:.6g}")

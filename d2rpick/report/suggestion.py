@@ -21,6 +21,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
+    name_step_to_better_pair,
     name_step_to_card,
     write_command,
 )
@@ -233,6 +234,8 @@ def list_next_step(
     pair = answer.recommended
     if decision is None or pair is None or decision.verdict == DO_NOT_USE:
         step = _name_step_after_refusal(answer, decision, question)
+    elif decision.better is not None:
+        step = name_step_to_better_pair(decision.better, question)
     else:
         step = name_step_to_card(
             situation.history,
@@ -262,7 +265,9 @@ def _name_step_after_refusal(
     else:
         line = write_command(question, "explore", *question.times)
         otherwise = f"compare other td with {line}"
-    return name_step_after_refusal(answer.situation, better, question, otherwise)
+    return name_step_after_refusal(
+        answer.situation, better, question, otherwise, decision
+    )
 
 
 def describe_improvement(answer: PairSuggestion, better: Pair) -> str:

@@ -16,6 +16,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
+    name_step_to_better_pair,
     name_step_to_card,
     write_command,
 )
@@ -80,7 +81,7 @@ def as_table(trade_off: TradeOff, display: DisplayOptions) -> str:
     listed_offers = select_offers(trade_off, display.limit)
     if listed_offers:
         offered = tables.as_text(
-            *tables.select_known_columns(*build_offer_table(listed_offers)),
+            *tables.select_known_columns(*build_offer_table(listed_offers, trade_off)),
             display.width,
             _SPARE,
         )
@@ -134,8 +135,10 @@ def list_next_step(
     elif decision.verdict == DO_NOT_USE:
         otherwise = f"compare all flights with {write_command(question, 'plan')}"
         step = name_step_after_refusal(
-            offer.answer.situation, decision.better, question, otherwise
+            offer.answer.situation, decision.better, question, otherwise, decision
         )
+    elif decision.better is not None:
+        step = name_step_to_better_pair(decision.better, question)
     else:
         times = ("--td", f"{offer.td:.6g}")
         step = name_step_to_card(
@@ -237,7 +240,9 @@ def _describe_error_at(offer: Offer) -> str:
 def as_markdown(trade_off: TradeOff, display: DisplayOptions) -> str:
     """Return the lines and the pairs of the text table as Markdown, with the reasons for the verdicts above them."""
     listed_offers = select_offers(trade_off, display.limit)
-    offer_table = tables.select_known_columns(*build_offer_table(listed_offers))
+    offer_table = tables.select_known_columns(
+        *build_offer_table(listed_offers, trade_off)
+    )
     reasons = tables.format_as_list(list_offer_reasons(listed_offers))
     return "\n\n".join(
         [
@@ -388,14 +393,19 @@ def select_offers(trade_off: TradeOff, limit: int) -> list[Offer]:
 
 
 def build_offer_table(
-    offers: Sequence[Offer],
+    offers: Sequence[Offer], trade_off: TradeOff
 ) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Return the column names and cells of the proposed pairs; the recommended pair has a star.
+    """Return the column names and cells of the proposed pairs; the pair of the first line of the answer has a star.
 
     `list_offer_reasons` explains the numbers beside the verdicts.
     """
     numbers = _number_offer_reasons(offers)
-    columns = {**_COLUMNS, "verdict": lambda offer: _format_verdict(offer, numbers)}
+    first = trade_off.requested or trade_off.recommended
+    columns = {
+        "": lambda offer: "*" if offer is first else " ",
+        **_COLUMNS,
+        "verdict": lambda offer: _format_verdict(offer, numbers),
+    }
     return tables.fill_table(columns, offers)
 
 
@@ -423,7 +433,6 @@ def _make_getter_of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
 
 
 _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
-    "": lambda offer: "*" if offer.recommended else " ",
     "td": lambda offer: offer.td,
     "peak": lambda offer: "peak" if offer.peak else "",
     "tr": lambda offer: offer.tr,

@@ -18,6 +18,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     name_step_after_refusal,
+    name_step_to_better_pair,
     name_step_to_card,
     write_command,
 )
@@ -115,12 +116,18 @@ def list_next_step(
     if decision.verdict == DO_NOT_USE:
         line = write_command(question, "explore", "--td", f"{answer.td:.6g}")
         step = name_step_after_refusal(
-            situation, decision.better, question, f"compare other td with {line}"
+            situation,
+            decision.better,
+            question,
+            f"compare other td with {line}",
+            decision,
         )
     elif answer.switched:
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
         step = f"use the results of the switched run; keep the comparison with {line}"
+    elif decision.better is not None:
+        step = name_step_to_better_pair(decision.better, question)
     else:
         step = name_step_to_card(
             situation.history,

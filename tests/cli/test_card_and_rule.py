@@ -315,9 +315,11 @@ def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
         == run(*arguments, "merged.k", "--merge", "101").exit_code
         == 0
     )
-    assert "internal energy is that of the whole model" in join_comments(
+    assert "table does not name the parts of the internal energy" in join_comments(
         Path("alone.k").read_text()
     )
+    of_solver = run("card", *GOOD, "--part", "1", "--history", GLSTAT, "--exit-zero")
+    assert "that of the whole model" in join_comments(of_solver.stdout)
     assert "whole model" not in join_comments(run("card", *GOOD, "--part", "1").stdout)
     for card in ("alone.k", "merged.k"):
         assert Path(card).read_text().count("PSET") == 2

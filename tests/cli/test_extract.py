@@ -16,6 +16,7 @@ from tests.command import (
     BOX as ROLLOVER_T01,
     ENERGY,
     GLSTAT,
+    MATSUM,
     OSCILLATOR,
     ROLLOVER,
     ROOT,
@@ -112,8 +113,9 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
 
 def test_one_part_needs_no_column_beside_the_energy() -> None:
     source = ROLLOVER_T01
+    # The step flies with the box but was not chosen, so that its energy has a name of its own.
     assert run("extract", "--part", "box", source).stdout.startswith(
-        "time,internal_energy,kinetic_energy,"
+        "time,internal_energy,not_chosen_part_2,kinetic_energy,"
     )
 
 
@@ -131,6 +133,43 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["csv", "h5"])
+def test_a_table_of_some_parts_has_the_verdict_of_its_run(
+    suffix: str, tmp_path: Path
+) -> None:
+    # The step vibrates together with the box, so the energy of the box alone shows no direction of the deformation.
+    table = str(tmp_path / f"box.{suffix}")
+    extracted = run("extract", "--part", "box", MATSUM, "-o", table)
+    assert "step" in extracted.stderr
+    answers = [run_json("suggest", "--part", "box", MATSUM), run_json("suggest", table)]
+    for key in ("verdict", "verdict_reason", "basis", "recommended"):
+        assert answers[0][key] == answers[1][key], key
+    assert "also make part 2 rigid" in answers[1]["cure"]
+
+
+def test_a_table_of_all_parts_that_vibrate_leaves_out_none(tmp_path: Path) -> None:
+    table = str(tmp_path / "both.csv")
+    run("extract", "--part", "1,2", MATSUM, "-o", table)
+    assert "not_chosen" not in Path(table).read_text()
+    assert run_json("suggest", table)["basis"] == "modal"
+
+
+def test_the_sum_with_the_part_left_out_is_of_all_parts(tmp_path: Path) -> None:
+    table = str(tmp_path / "box.csv")
+    run("extract", "--part", "box", MATSUM, "-o", table)
+    energies = ("--energy", "internal_energy", "--energy", "not_chosen_part_2")
+    assert run_json("suggest", *energies, table)["basis"] == "modal"
+
+
+def test_the_card_of_a_table_does_not_claim_the_whole_model(tmp_path: Path) -> None:
+    table = str(tmp_path / "box.csv")
+    run("extract", "--part", "box", MATSUM, "-o", table)
+    times = ("--tr", "0.124169", "--td", "0.369799", "--part", "1", "--exit-zero")
+    card = run("card", *times, "--history", table).stdout
+    assert "that of the whole model" not in card
+    assert "does not name the parts of the internal" in card
+
+
 @pytest.mark.parametrize(
     ("source", "suffix"), [*((source, "csv") for source in BOX), ("matsum", "h5")]
 )

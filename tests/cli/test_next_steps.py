@@ -186,7 +186,6 @@ BOX_ONLY = ("--part", "box", MATSUM)
         ("verify", *WITH_CARE[:4], MATSUM),
         ("verify", "--deck", DECK, *WITH_CARE, MATSUM),
         ("verify", *DO_NOT_USE, MATSUM),
-        ("parts", MATSUM),
         ("parts", "--deck", DECK, MATSUM),
         ("study", ENERGY, ENERGY),
         ("study", "--td", "0.0687534", ENERGY),
@@ -302,3 +301,152 @@ def test_a_deck_that_already_switches_its_parts_is_named(tmp_path: Path) -> None
     text = run("plan", "--part", "1,2", "--deck", deck, MATSUM).stderr
     assert "the deck already switches parts with *DEFORMABLE_TO_RIGID_AUTOMATIC" in text
     assert "remove its switching cards" in text
+
+
+EXCEL = str(SAMPLES / "rollover_box_excel.csv")
+
+
+@pytest.mark.parametrize("options", [(), ("--deck", DECK)])
+@pytest.mark.parametrize("command", ["suggest", "explore"])
+def test_a_missing_mass_is_named_and_no_deck_is_asked_for(
+    command: str, options: tuple[str, ...]
+) -> None:
+    question = (command, "--td", "369.631", *options, EXCEL)
+    assert "do not contain the mass" in find_line("why", *question)
+    cure = find_line("to improve", *question)
+    assert cure.startswith("write the mass")
+    assert "--deck" not in cure
+    # The other commands have the same verdict, so that the step leads to a better record rather than round in a circle.
+    step = find_line("next", *question)
+    assert step.startswith("improve the record")
+    assert step.endswith(shlex.join(["suggest", "--td", "369.631", *options, EXCEL]))
+
+
+def test_the_mass_that_was_asked_for_helps(tmp_path: Path) -> None:
+    head, *rows = Path(EXCEL).read_text().splitlines()
+    table = tmp_path / "with_mass.csv"
+    table.write_text("\n".join([f"{head};Mass", *(f"{row};356" for row in rows)]))
+    assert run_json("suggest", EXCEL)["verdict"] == "do not use"
+    assert run_json("suggest", str(table))["verdict"] == "use with care"
+
+
+def test_the_step_to_a_better_record_keeps_a_window_for_td() -> None:
+    question = ("suggest", "--td-window", "340.5", "370.5", EXCEL)
+    assert find_line("next", *question).endswith(shlex.join(question))
+
+
+def test_the_step_of_a_plan_without_a_mass_is_not_another_tour() -> None:
+    text = run("plan", EXCEL).stdout
+    assert "next  improve the record as said above" in text
+
+
+# verify blames what is to blame.
+
+
+def test_verify_blames_a_wrong_tr_with_one_error() -> None:
+    reason = find_line("why", "verify", "--tr", "0.02", "--td", "0.064", ENERGY)
+    assert "285%, because tr does not match td" in reason
+    assert "the energy at tr is 106 times that at td" in reason
+    # The best tr of suggest has this error.
+    best = run_json("suggest", "--td", "0.064", ENERGY)["candidates"][0]["residual"]
+    assert reason.endswith(f"the best tr at this td is wrong by {best:.0%}")
+    assert "frozen-deformation error" not in reason
+    assert "hides a further mode" not in reason
+
+
+def test_verify_blames_td_if_tr_is_the_best_for_it() -> None:
+    tr = run_json("suggest", "--td", "0.064", ENERGY)["recommended"]["tr"]
+    reason = find_line("why", "verify", "--tr", str(tr), "--td", "0.064", ENERGY)
+    assert "kinetic at td, which no tr can keep" in reason
+    assert "tr does not match" not in reason
+
+
+# The next step does not contradict the answer.
+
+
+def test_outside_the_flight_the_step_is_to_the_flight() -> None:
+    for tr, td in (("0.1", "0.4"), ("0.05", "0.36")):
+        question = ("verify", "--tr", tr, "--td", td, "--part", "box", MATSUM)
+        assert find_line("to improve", *question) == "choose tr and td in one flight"
+        expected = shlex.join(["suggest", "--part", "box", MATSUM])
+        assert find_line("next", *question).endswith(expected)
+
+
+def test_a_tr_during_the_load_is_named_as_the_only_reason() -> None:
+    question = ("verify", "--tr", "0.05", "--td", "0.36", "--part", "1,2", MATSUM)
+    assert find_line("why", *question) == "tr before the end of the load at 0.086"
+    assert "write the energies more often" not in run(*question).stdout
+
+
+@pytest.mark.parametrize("deck", [(), ("--deck", str(SAMPLES / "switching.k"))])
+def test_parts_without_its_deck_asks_for_the_deck(deck: tuple[str, ...]) -> None:
+    step = find_line("next", "parts", *deck, MATSUM)
+    assert f"d2rpick parts --deck DECK {MATSUM}" in step
+    assert "switching.k" not in step
+
+
+def test_parts_without_momenta_leads_to_the_plan_of_all_parts() -> None:
+    folder = str(SAMPLES / "oscillator")
+    step = find_line("next", "parts", folder)
+    assert step.endswith(f"plan --part all {folder}")
+    assert run("plan", "--part", "all", folder).exit_code == 0
+
+
+@pytest.mark.parametrize("command", ["suggest", "explore"])
+def test_the_step_leads_to_the_better_pair_that_the_answer_names(command: str) -> None:
+    question = (command, "--td", "0.08", ENERGY)
+    better = re.search(r"td = ([0-9.]+)", find_line("to improve", *question))
+    assert better
+    expected = shlex.join(["suggest", "--td", better[1], ENERGY])
+    assert find_line("next", *question).endswith(expected)
+
+
+def test_the_star_marks_the_pair_of_the_first_line() -> None:
+    text = run("explore", "--td", "0.08", ENERGY).stdout
+    (starred,) = re.findall(r"^\*  +([0-9.]+)", text, re.MULTILINE)
+    assert starred == "0.08"
+    assert run_json("explore", "--td", "0.08", ENERGY)["recommended"]["td"] != 0.08
+
+
+def test_without_a_pair_the_better_one_is_that_of_its_flight() -> None:
+    answer = run_json("suggest", "--td", "0.02", "--part", "1,2", MATSUM)
+    best = run_json("suggest", "--part", "1,2", MATSUM)["recommended"]
+    assert answer["better_td"]["td"] == best["td"]
+
+
+def test_a_plan_against_the_verdict_says_so() -> None:
+    question = ("plan", "--part", "box", "--min-quality", "poor", MATSUM)
+    assert run(*question).stdout.startswith("do not use: planned nevertheless")
+
+
+def test_a_study_of_pairs_that_cannot_be_used_fails_as_suggest_does() -> None:
+    chosen = ("--part", "box", MATSUM)
+    assert run("suggest", *chosen).exit_code == 1
+    study = run("study", *chosen)
+    assert study.stdout.startswith("do not use")
+    assert "level error 0.000" in study.stdout
+    assert study.exit_code == 1
+    assert run("study", "--exit-zero", *chosen).exit_code == 0
+    for command in ("suggest", "study"):
+        assert run(command, "--td", "0.37", *chosen).exit_code == 0
+
+
+def test_the_next_study_leaves_out_what_cannot_be_read(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.csv"
+    broken.write_text("x,y\n")
+    step = find_line("next", "study", ENERGY, str(broken))
+    assert step.endswith(ENERGY)
+    assert "broken.csv" not in step
+
+
+@pytest.mark.parametrize("command", ["suggest", "explore", "plan"])
+def test_a_tr_that_is_given_leads_to_verify(command: str) -> None:
+    refused = run(command, "--tr", "0.01", ENERGY)
+    assert refused.exit_code == 2
+    assert "d2rpick verify judges a given tr" in refused.stderr
+
+
+def test_a_cure_is_given_once() -> None:
+    times = ("--tr", "0.0001", "--td", "0.1", "--part", "all")
+    text = run("verify", *times, str(SAMPLES / "oscillator" / "OSCT01.gz")).stdout
+    assert "write the energies more often; write" not in " ".join(text.split())

@@ -338,6 +338,18 @@ class Candidates(Sequence[Candidate]):
     def __iter__(self) -> Iterator[Candidate]:
         return iter(self[:])
 
+    def list_objections(self, rank: int, *, of_error: bool = True) -> tuple[str, ...]:
+        """Return why a candidate is not admissible; ``of_error`` False leaves out that its error is too large."""
+        return tuple(
+            self._describe_objections(int(self.order[rank]), of_error=of_error)
+        )
+
+    def _describe_objections(self, row: int, *, of_error: bool = True) -> Iterator[str]:
+        """Yield the objections to the candidate in a row of ``judged``."""
+        for objection in self.judged.objections:
+            if objection.holds[row] and (of_error or not objection.is_of_error):
+                yield from objection.describe(row)
+
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i = int(self.order[rank])
         situation = self.situation
@@ -355,10 +367,7 @@ class Candidates(Sequence[Candidate]):
         if values["position_error"] is not None and situation.bodies:
             values |= _describe_position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / history.duration
-        notes = list[str]()
-        for objection in judged.objections:
-            if objection.holds[i]:
-                notes += objection.describe(i)
+        notes = [*self._describe_objections(i)]
         admissible = not notes
         residual = values["residual"]
         is_kept = residual is None or residual <= POOR_RESIDUAL

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.pair.aftermath import bound_mean_energy
 from d2rpick.choice.pair.grades import GOOD, GRADES, POOR, VERDICTS
-from d2rpick.choice.pair.quality import MOST_WORTH_OF_FAIR, grade_pair
+from d2rpick.choice.pair.quality import (
+    CHOOSE_TIMES_IN_FLIGHT,
+    MOST_WORTH_OF_FAIR,
+    grade_pair,
+)
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from d2rpick.choice.pair.aftermath import MeanEnergyBounds
     from d2rpick.choice.pair.candidates import Candidate, Pair
@@ -87,6 +91,19 @@ class Decision(NamedTuple):
         """The verdict in words: "use", "use with care" or "do not use"."""
         return VERDICTS[self.grade]
 
+    @property
+    def needs_better_record(self) -> bool:
+        """True if the pair cannot be used for a cause that holds for each pair of the record."""
+        causes = self.quality.causes
+        return self.grade == POOR and any(cause.is_of_record for cause in causes)
+
+    @property
+    def is_outside_flight(self) -> bool:
+        """True if tr or td lies outside the flight."""
+        return any(
+            cause.cure == CHOOSE_TIMES_IN_FLIGHT for cause in self.quality.motion.causes
+        )
+
     def reaches(self, grade: str) -> bool:
         """Return True if the pair has at least the given grade."""
         return GRADES.index(self.grade) >= GRADES.index(grade)
@@ -96,6 +113,9 @@ class Decision(NamedTuple):
         """Reason for the verdict."""
         if self.objections:
             return "; ".join(self.objections)
+        if self.grade == POOR and self.quality.grade != POOR:
+            # The error makes the pair inadmissible, however little it matters in the next contact.
+            return "; ".join(self.quality.alone.reasons)
         if self.at_rest and not self.quality.reasons:
             return "nothing vibrates in the flight up to td"
         reasons = "; ".join(self.quality.reasons)
@@ -110,6 +130,9 @@ class Decision(NamedTuple):
         """Reason for a verdict other than "use", without numbers, so that several pairs can share it."""
         if self.objections:
             return "; ".join(self.objections)
+        if self.grade == POOR and self.quality.grade != POOR:
+            causes = self.quality.alone.causes
+            return "; ".join(cause.general_reason for cause in causes)
         reasons = "; ".join(cause.general_reason for cause in self.quality.causes)
         if self.is_limited_by_raised_grade:
             limit = (
@@ -158,10 +181,11 @@ class Decision(NamedTuple):
             return ""
         if self.better is not None:
             return f"use {_describe_pair(self.better)}"
+        if self.is_outside_flight and not self.is_compared:
+            return CHOOSE_TIMES_IN_FLIGHT
         if self.objections or not self.quality.causes:
             return self.cure_of_objections
-        cures = dict.fromkeys(map(self.specify_cure, self.quality.causes))
-        return "; ".join(cures)
+        return join_cures(map(self.specify_cure, self.quality.causes))
 
     def specify_cure(self, cause: Cause) -> str:
         """Return the advice that removes a cause; other times are not advised if the pair is the best of a td range."""
@@ -173,6 +197,22 @@ class Decision(NamedTuple):
         return f"no clearly better pair was found for td from {low:.6g} to {high:.6g}: {advice}"
 
 
+def join_cures(cures: Iterable[str]) -> str:
+    """Join cures, each once and without those that another one begins with.
+
+    Examples
+    --------
+    >>> join_cures(["write more often", "write more often, with more digits", "give the deck"])
+    'write more often, with more digits; give the deck'
+    """
+    listed = [*dict.fromkeys(cures)]
+    return "; ".join(
+        cure
+        for cure in listed
+        if not any(other != cure and other.startswith(cure) for other in listed)
+    )
+
+
 def decide(
     situation: Situation,
     candidate: Candidate,
@@ -181,15 +221,19 @@ def decide(
     better: Pair | None = None,
     cure_of_objections: str = CHOOSE_ANOTHER,
     best_of: tuple[float, float] | None = None,
+    is_admissible: bool = True,
+    best_residual: float | None = None,
 ) -> Decision:
     """Return the verdict on a tr; any of the ``objections`` makes it inadmissible, and ``better`` is a better pair.
 
-    If there is no better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of
-    which the pair is the best [time], if all were compared.
+    ``is_admissible`` False does so without objections, if they say nothing but that the residual is too large.
+    ``best_residual`` is that of the best tr at this td [-]: if it is clearly smaller, tr is to blame.  If there is no
+    better pair, ``cure_of_objections`` says what to do about them.  ``best_of`` is the range of td of which the pair is
+    the best [time], if all were compared.
     """
-    quality = grade_pair(situation, candidate)
+    quality = grade_pair(situation, candidate, best_residual)
     return Decision(
-        grade=POOR if objections else quality.grade,
+        grade=quality.grade if is_admissible and not objections else POOR,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,

@@ -18,6 +18,7 @@ from d2rpick.choice.pair.warnings import (
     POOR_RESIDUAL,
     list_times_outside_flight,
 )
+from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.model import NOTHING_KEPT
@@ -64,7 +65,7 @@ _FEW_STATES: Final = 20
 _NAMED: Final = 5
 _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
-_CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
+CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
 # End of the advice on a pair; it is omitted if the finished switched run is already available.
 _OR_COMPARE: Final = ", or compare with a finished switched run"
@@ -243,14 +244,16 @@ def list_exceeded_limits(
 class Cause(NamedTuple):
     """The ``reason`` why a grade is not better, and the ``cure`` that would improve the grade.
 
-    ``needs_other_times``: the cure is another tr or td.  ``kind`` is the reason without the numbers of this pair,
-    by default the reason itself; with it a table explains once what several pairs have in common.
+    ``needs_other_times``: the cure is another tr or td.  ``is_of_record``: the cause holds for each pair of the record,
+    so other times do not help before the record or the deck is improved.  ``kind`` is the reason without the numbers
+    of this pair, by default the reason itself; with it a table explains once what several pairs have in common.
     """
 
     reason: str
     cure: str
     needs_other_times: bool = False
     kind: str = ""
+    is_of_record: bool = False
 
     @property
     def general_reason(self) -> str:
@@ -266,9 +269,25 @@ _CHECK_GIVEN_TIMES: Final = (
     "make sure that no force acts in the flight that you gave, "
     "or let the evidence decide, without `after` and `landing`"
 )
+_UNKNOWN_OUTSIDE: Final = Cause(
+    "the error of the vibration is unknown, because tr or td lies outside the flight",
+    CHOOSE_TIMES_IN_FLIGHT,
+)
+_UNKNOWN_MASS: Final = Cause(
+    "the files do not contain the mass, so it is unknown whether gravity or another load changes the momentum in the "
+    "flight",
+    "write the mass, or the kinetic and internal energy, or give the file with the energies of the parts (LS-DYNA "
+    "matsum, Radioss T01)",
+    is_of_record=True,
+)
 _UNKNOWN_LOAD: Final = Cause(
     "gravity or another load changes momentum or energy in the flight",
     "give the deck of the run as `deck`, because it defines gravity and loads, or write the part momenta",
+    is_of_record=True,
+)
+# The cause if the deck was given, and still does not explain the change.
+_UNKNOWN_LOAD_WITH_DECK: Final = _UNKNOWN_LOAD._replace(
+    cure="write the part momenta (LS-DYNA matsum, Radioss /TH/PART)"
 )
 
 
@@ -345,22 +364,43 @@ def _explain_uncertain_flight(flight: Flight) -> Cause:
     return _NOT_CERTAIN
 
 
-def grade_pair(situation: Situation, best: Candidate) -> Quality:
-    """Grade a recommended tr by its motion, by its vibration error, and by that error relative to the next contact."""
+def _explain_unknown_load(situation: Situation) -> Cause:
+    """Return why a load in the flight is unknown: a missing mass, a missing deck, or missing momenta."""
+    history, flight = situation.history, situation.flight
+    momenta = history.find_momenta(of_parts=flight.parts is not None)
+    if flight.source == "momentum" and momenta and not momenta.velocity:
+        mass = momenta.mass(momenta.chosen)
+        # A mass that is not in the files is NaN, or 0 in a sum.
+        if not mass > 0:
+            return _UNKNOWN_MASS
+    return _UNKNOWN_LOAD if history.surroundings is UNKNOWN else _UNKNOWN_LOAD_WITH_DECK
+
+
+def grade_pair(
+    situation: Situation, best: Candidate, best_residual: float | None = None
+) -> Quality:
+    """Grade a tr by its motion, by its vibration error, and by that error relative to the next contact.
+
+    ``best_residual`` is that of the best tr at this td [-], None if it is unknown or if this is the best tr.
+    """
     flight = situation.flight
     uncertain = () if flight.certain else (_explain_uncertain_flight(flight),)
     outside = list_times_outside_flight(situation, best.tr)
     ruined = [
-        *(Cause(fault, _CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
-        *(Cause(fault, _CORRECT_THE_DECK) for fault in situation.settings.ruined),
+        *(Cause(fault, CHOOSE_TIMES_IN_FLIGHT) for fault in outside),
+        *(
+            Cause(fault, _CORRECT_THE_DECK, is_of_record=True)
+            for fault in situation.settings.ruined
+        ),
     ]
     if flight.unknown_load:
-        ruined.append(_UNKNOWN_LOAD)
+        ruined.append(_explain_unknown_load(situation))
     motion = Grade.of(ruined, uncertain)
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(
-        _list_causes_for_poor(situation, best), _list_causes_for_fair(situation, best)
+        _list_causes_for_poor(situation, best, best_residual),
+        _list_causes_for_fair(situation, best),
     )
     worth = compare_error_with_contact(situation, best)
     counted = (
@@ -380,13 +420,19 @@ def _raise_grade_by_worth(alone: Grade, worth: Worth | None) -> Grade:
     return Grade("fair", alone.causes)
 
 
-def _list_causes_for_poor(situation: Situation, best: Candidate) -> list[Cause]:
+def _list_causes_for_poor(
+    situation: Situation, best: Candidate, best_residual: float | None
+) -> list[Cause]:
     """Return the causes of the vibration grade "poor"."""
     causes = []
     if best.residual is None:
-        causes.append(_describe_unknown_direction(situation))
+        if list_times_outside_flight(situation, best.tr):
+            causes.append(_UNKNOWN_OUTSIDE)
+        else:
+            causes.append(_describe_unknown_direction(situation))
     elif best.residual > POOR_RESIDUAL:
-        causes.append(_describe_wrong_vibration(situation, best.residual))
+        wrong = _describe_wrong_tr(best, best.residual, best_residual)
+        causes.append(wrong or _describe_wrong_vibration(situation, best.residual))
     if situation.basis == "energy":
         causes += _list_causes_of_record(
             situation.history, situation.flight.start, situation.td
@@ -459,14 +505,35 @@ def _ask_for_more_states(situation: Situation) -> Iterator[str]:
 
 def _describe_cure_for_modes(situation: Situation) -> str:
     """Return the cure that would reveal the modes of the vibration: other parts, or more states."""
-    if situation.history.parts is None:
-        return "name the parts to be switched with `parts`, if the files contain parts"
     other_parts = situation.together.not_chosen.parts
+    if situation.history.parts is None and not other_parts:
+        return "name the parts to be switched with `parts`, if the files contain parts"
     if other_parts:
         names = list_names([part.name for part in other_parts], most=_NAMED)
         vibrates = "it vibrates" if len(other_parts) == 1 else "they vibrate"
         return f"also make {names} rigid, because {vibrates} together with the chosen parts"
     return _MORE_OFTEN
+
+
+def _describe_wrong_tr(
+    candidate: Candidate, residual: float, best_residual: float | None
+) -> Cause | None:
+    """Return the cause "tr does not match td" if the best tr at this td is clearly better; otherwise None."""
+    if best_residual is None or residual - best_residual <= EQUALLY_GOOD:
+        return None
+    reason = f"the vibration after td is wrong by {residual:.0%}, because tr does not match td"
+    ratio = candidate.level_ratio
+    if ratio is not None and abs(ratio - 1) > LIKE_LEVELS:
+        reason += f": the energy at tr is {ratio:.3g} times that at td"
+    elif candidate.sign_match is False:
+        reason += ": the deformation has the opposite direction"
+    best = f"the best tr at this td is wrong by {best_residual:.0%}"
+    return Cause(
+        f"{reason}; {best}",
+        "use d2rpick suggest with this td to find a better tr",
+        needs_other_times=True,
+        kind=f"{_WRONG_BY_MORE} {POOR_RESIDUAL:.0%}, because tr does not match td",
+    )
 
 
 def _describe_wrong_vibration(situation: Situation, residual: float) -> Cause:

@@ -476,11 +476,13 @@ class Objection(NamedTuple):
     """An objection that applies to each candidate for which ``holds``, shape (n,), is True.
 
     ``describe`` returns its text for a candidate by index.  Since answers are pickled with it, it is a function of
-    this module with some of its arguments.
+    this module with some of its arguments.  ``is_of_error``: it only says that an error is too large, as the residual
+    does.
     """
 
     holds: NDArray[np.bool_]
     describe: Callable[[int], Iterable[str]]
+    is_of_error: bool = False
 
 
 def list_objections(
@@ -524,7 +526,9 @@ def list_objections(
     ]
     same_sign = (columns["sign_match"] != 0) | modal
     yield Objection(
-        moves & ~described, partial(_tell_undescribed, situations, situation_of)
+        # Before the flight no model is expected to describe the vibration, so that is no second objection.
+        moves & ~described & ~is_early,
+        partial(_tell_undescribed, situations, situation_of),
     )
     yield Objection(
         moves & ~same_sign,
@@ -541,11 +545,14 @@ def list_objections(
         ("level error", ~compared),
     ):
         yield Objection(
-            too_much & ~modal & of_this_name, partial(_tell_error, name, error, limits)
+            too_much & ~modal & of_this_name,
+            partial(_tell_error, name, error, limits),
+            is_of_error=True,
         )
     yield Objection(
         too_much & modal,
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
+        is_of_error=True,
     )
     # If td lies after the end of the flight, the energy in the flight does not predict the motion after td.
     means = [
@@ -564,7 +571,9 @@ def list_objections(
             )[situation_of]
         )
         yield Objection(
-            is_above, partial(_tell_above_the_reference, means, situation_of, energy)
+            is_above,
+            partial(_tell_above_the_reference, means, situation_of, energy),
+            is_of_error=True,
         )
 
 
@@ -579,7 +588,7 @@ def list_times_outside_flight(situation: Situation, tr: float) -> list[str]:
     """Return descriptions of the times of a pair that lie outside the flight or less than the margin before its end."""
     outside = []
     if tr < _get_first_tr(situation):
-        outside.append(f"tr {_describe_in_load(situation)}")
+        outside.append(_describe_in_load(situation))
     if situation.td > situation.latest_td:
         outside.append(f"td after {describe_end_of_flight(situation)}")
     return outside
@@ -649,7 +658,7 @@ def _describe_in_load(situation: Situation) -> str:
     """State that a tr lies before the flight, or that no flight is known."""
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: no end of the load is found"
-    return f"before {describe_end_of_load(situation)}"
+    return f"tr before {describe_end_of_load(situation)}"
 
 
 def _describe_keeps_nothing(situation: Situation, residual: float) -> str:

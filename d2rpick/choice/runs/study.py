@@ -23,7 +23,7 @@ from d2rpick.base.errors import (
     list_names,
 )
 from d2rpick.choice.answers import decide_with_better_pair, suggest_in_run
-from d2rpick.choice.pair.grades import GRADES
+from d2rpick.choice.pair.grades import GRADES, POOR
 from d2rpick.choice.pair.quality import EQUALLY_GOOD, grade_residual
 from d2rpick.choice.pair.windows import (
     count_coverage,
@@ -203,8 +203,14 @@ class StudyOfRuns:
 
     @property
     def objection(self) -> bool:
-        """True if one of the runs has no tr, or if there is no common tr."""
-        return self.common.tr is None or any(row.status != OK for row in self.runs)
+        """True if a run has no tr, if there is no common tr, or if td was chosen and the common tr cannot be used."""
+        is_incomplete = any(row.status != OK for row in self.runs)
+        return self.common.tr is None or is_incomplete or self.is_choice_refused
+
+    @property
+    def is_choice_refused(self) -> bool:
+        """True if td was chosen, and the common tr cannot be used; for a given td the best tr is not a problem."""
+        return self.td is None and self.grade == POOR
 
 
 def judge_run(question: Question, source: str) -> StudyRow:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.histories.names import Part
 
 # Times at which the search for a contact-free vibration starts, as fractions of the record [-].
 _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
@@ -226,26 +227,11 @@ def list_momentum_columns(history: History) -> dict[str, Samples]:
     import numpy as np
 
     # Imported here to keep start-up fast.
-    from d2rpick.flight.momentum import (
-        find_all_flights,
-        select_momenta_for_flight,
-    )
+    from d2rpick.flight.momentum import find_all_flights
 
-    momenta_at_states = [
-        momenta
-        for momenta in select_momenta_for_flight(history.momenta)
-        if np.array_equal(momenta.time, history.time)
-    ]
-    if not momenta_at_states:
+    momenta = _find_momenta_of_flights(history)
+    if momenta is None:
         return {}
-    momenta = next(
-        (
-            momenta
-            for momenta in momenta_at_states
-            if find_all_flights(momenta, history.balance)
-        ),
-        momenta_at_states[0],
-    )
     flights = find_all_flights(momenta, history.balance)
     members = momenta.chosen
     if flights and momenta.parts:
@@ -260,3 +246,44 @@ def list_momentum_columns(history: History) -> dict[str, Samples]:
         for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)
     }
     return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})
+
+
+def list_flying_parts_not_chosen(history: History) -> tuple[Part, ...]:
+    """Return the parts that fly with the chosen parts in a flight, but were not chosen; empty if none are known."""
+    # Imported here to keep start-up fast.
+    from d2rpick.flight.momentum import find_all_flights
+
+    momenta = _find_momenta_of_flights(history)
+    if momenta is None or not (momenta.parts and history.parts):
+        return ()
+    flights = find_all_flights(momenta, history.balance)
+    flying = {part.id for flight in flights for part in flight.parts or momenta.parts}
+    flying -= {part.id for part in history.parts}
+    return tuple(part for part in momenta.parts if part.id in flying)
+
+
+def _find_momenta_of_flights(history: History) -> Momenta | None:
+    """Return the momenta that show flights, or else the first ones; None if none are at the times of the energy."""
+    import numpy as np
+
+    # Imported here to keep start-up fast.
+    from d2rpick.flight.momentum import (
+        find_all_flights,
+        select_momenta_for_flight,
+    )
+
+    momenta_at_states = [
+        momenta
+        for momenta in select_momenta_for_flight(history.momenta)
+        if np.array_equal(momenta.time, history.time)
+    ]
+    if not momenta_at_states:
+        return None
+    return next(
+        (
+            momenta
+            for momenta in momenta_at_states
+            if find_all_flights(momenta, history.balance)
+        ),
+        momenta_at_states[0],
+    )
