@@ -10,7 +10,6 @@ import numpy as np
 
 from d2rpick.base.memory import remember
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.flight.contact_forces import Touches, is_deformed
 from d2rpick.flight.internal_energy import (
     find_settled_time,
     has_whole_motion,
@@ -26,6 +25,7 @@ from d2rpick.flight.window import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.flight.contact_forces import Touches
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
@@ -298,7 +298,12 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         )
     forces = history.evidence.forces
     whole = history.find_momenta(of_parts=False)
-    touches = Touches.of(forces, whole) if forces else None
+    touches = None
+    if forces:
+        # Imported here to keep start-up fast.
+        from d2rpick.flight.contact_forces import Touches
+
+        touches = Touches.of(forces, whole)
     balance = history.balance
     is_better_known = bool(history.momenta)
     if touches is not None:
@@ -421,6 +426,9 @@ def _find_flight_by_forces(
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
+    # Imported here to keep start-up fast.
+    from d2rpick.flight.contact_forces import is_deformed
+
     flight = touches.flight_around(td)
     balance = history.balance
     if (
