@@ -2,6 +2,7 @@
 
 import ast
 import compileall
+import importlib
 import re
 import subprocess
 import sys
@@ -415,3 +416,23 @@ def test_every_schema_is_listed() -> None:
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])
 def test_the_package_ships_what_is_not_code(name: str) -> None:
     assert files("d2rpick").joinpath(name).is_file()
+
+
+def test_the_programs_inside_benchmarks_import_names_that_exist() -> None:
+    """A benchmark starts other processes with a program in a text, which no type checker reads."""
+    imports = [
+        (benchmark.name, module, name.strip().split(" as ")[0])
+        for benchmark in sorted((ROOT / "tests" / "benchmarks").glob("*.py"))
+        for module, names in re.findall(
+            r"from (d2rpick[\w.]*) import ([\w, ]+)", benchmark.read_text("utf-8")
+        )
+        for name in names.split(",")
+    ]
+    assert len(imports) > 20
+    missing = [
+        (benchmark, module, name)
+        for benchmark, module, name in imports
+        if not hasattr(importlib.import_module(module), name)
+        and f"{module}.{name}".removeprefix("d2rpick.") not in MODULES
+    ]
+    assert not missing

@@ -290,7 +290,7 @@ def suggest_memory() -> float:
 def hdf5_to_h5py() -> float:
     """Return the cost of reading an hdf5 of 1e6 rows over that of h5py alone, both as processes."""
     file = _write_hdf5()
-    ours = "import sys; from d2rpick.choice.question import read; read(sys.argv[1:])"
+    ours = "import sys; from d2rpick.choice.question import read_reference; read_reference(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
     return measure_ratio(
         lambda: read_output("-c", ours, str(file)),

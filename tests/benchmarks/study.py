@@ -32,11 +32,10 @@ RUNS, STATES, FEW, ROUNDS = 1000, 10_000, 100, 3
 MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
-from d2rpick.choice.answers import suggest
-from d2rpick.choice.question import read
-from d2rpick.choice.question import Settings
-found = [suggest(read([name]).history, {TD}, Settings()).recommended for name in sys.argv[1:]]
-assert all(found)
+from d2rpick.choice.answers import suggest_in_history
+from d2rpick.choice.question import Settings, read_reference
+for name in sys.argv[1:]:
+    assert suggest_in_history(read_reference([name]).history, {TD}, Settings()).recommended
 """
 
 
