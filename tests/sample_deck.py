@@ -114,7 +114,9 @@ def _lines(mesh: _Mesh) -> Iterator[str]:
     yield "*ELEMENT_SHELL"
     for number, (part, nodes) in enumerate(mesh.shells, start=1):
         yield f"{number:8d}{part:8d}" + "".join(f"{node:8d}" for node in nodes)
-    yield f"*LOAD_BODY_Z\n{1:10d}{9.81:10g}\n*DEFINE_CURVE\n{1:10d}\n{0:20d}{1:20d}\n{1:20d}{1:20d}\n*END"
+    yield f"*LOAD_BODY_Z\n{1:10d}{9.81:10g}\n*DEFINE_CURVE\n{1:10d}\n{0:20d}{1:20d}\n{1:20d}{1:20d}"
+    # The output that the sample histories contain, and that a switched run needs for its comparison.
+    yield f"*DATABASE_GLSTAT\n{0.001:10g}\n*DATABASE_MATSUM\n{0.001:10g}\n*END"
 
 
 def _starter(mesh: _Mesh) -> Iterator[str]:
