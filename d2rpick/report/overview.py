@@ -131,7 +131,7 @@ def list_overview_lines(overview: Overview) -> list[tuple[str, str]]:
     if overview.verdict == DO_NOT_USE:
         is_known = overview.unjudged or overview.rigid
         cure = None if is_known else overview.should_write
-        return [*lines, ("to improve", cure)] if cure else lines
+        return [*lines, ("to improve", f"write {cure}")] if cure else lines
     which = [*_list_selection_options(overview)]
     deck = ["--deck", overview.deck] if overview.deck else []
     command = ["d2rpick", "plan", *which, *deck]

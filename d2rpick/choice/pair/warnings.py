@@ -497,7 +497,7 @@ def list_objections(
     ----------
     situations : sequence
         Situations with the same record and rules.
-    place : array of shape (n,)
+    situation_of : array of shape (n,)
         Index of the situation of each candidate.
     tr : array of shape (n,)
         Times of the candidates [time].
@@ -534,8 +534,27 @@ def list_objections(
         moves & ~same_sign,
         partial(_tell_always, "at tr the deformation has the opposite direction"),
     )
-    error = np.where(compared, columns["lock_in_error"], columns["level_error"])
     judged = moves & described & same_sign
+    yield from _object_to_errors(
+        situations, situation_of, columns, judged, compared, modal
+    )
+    yield from _object_to_energy(situations, situation_of, columns["energy"])
+
+
+def _object_to_errors(
+    situations: Sequence[Situation],
+    situation_of: NDArray[np.int32],
+    columns: Columns,
+    judged: NDArray[np.bool_],
+    compared: NDArray[np.bool_],
+    modal: NDArray[np.bool_],
+) -> Iterator[Objection]:
+    """Yield the objections to candidates whose deformation differs too much from that at td.
+
+    Only ``judged`` candidates have an error.  It is that of the deformation if a model was ``compared``, otherwise that
+    of the level; ``modal`` candidates have a residual.
+    """
+    error = np.where(compared, columns["lock_in_error"], columns["level_error"])
     nothing = "the energy is not positive at tr, so no deformation can be compared"
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     limits = np.array([situation.most_error for situation in situations])[situation_of]
@@ -554,13 +573,18 @@ def list_objections(
         partial(_tell_keeps_nothing, situations, situation_of, columns["residual"]),
         is_of_error=True,
     )
+
+
+def _object_to_energy(
+    situations: Sequence[Situation], situation_of: NDArray[np.int32], energy: Samples
+) -> Iterator[Objection]:
+    """Yield the objection to candidates with more ``energy`` at tr than the reference run has after td."""
     # If td lies after the end of the flight, the energy in the flight does not predict the motion after td.
     means = [
         compute_means(situation) if situation.td <= situation.latest_td else None
         for situation in situations
     ]
     if any(means):
-        energy = columns["energy"]
         is_above = (
             energy
             > np.array(
