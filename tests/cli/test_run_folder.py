@@ -24,13 +24,11 @@ ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
 
 
 def write_run_folder(path: Path, extra_keywords: str = DATABASES) -> Path:
-    """Write the sample run with its deck."""
+    """Write the sample run with its deck, with other keywords instead of those for the output."""
     path.mkdir(exist_ok=True)
     shutil.copy(MATSUM, path / "matsum")
-    put(
-        path / "main.k",
-        DECK.read_text("utf-8").replace("*END", f"{extra_keywords}*END"),
-    )
+    model = DECK.read_text("utf-8").partition("*DATABASE")[0]
+    put(path / "main.k", f"{model}{extra_keywords}*END\n")
     return path
 
 
