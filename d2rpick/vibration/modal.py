@@ -610,6 +610,15 @@ def _read(
     )
 
 
+def _add_hidden_pairs(reading: Reading, systematic: float) -> Reading:
+    """Return a reading with the vibration energy that has no lines, from what its own modes leave of the mean."""
+    spectrum = reading.spectrum
+    level = reading.level_of_modes(reading.times)
+    static = spectrum.mean.at(reading.times) - level / 2
+    pairs = measure_hidden_pairs(static, level, spectrum.error, systematic)
+    return replace(reading, hidden_pairs=pairs)
+
+
 def _choose_interpretation(
     plain: Reading,
     stretches: tuple[StretchLine, ...],
@@ -630,12 +639,10 @@ def _choose_interpretation(
         plain, is_mode=_mask_modes(spectrum.lines, stretches), no_static=False
     )
     half = with_static.level_of_modes(time) / 2
-    static = spectrum.mean.at(time) - half
     if not kinetic:
-        pairs = measure_hidden_pairs(static, 2 * half, spectrum.error, systematic)
-        plain = replace(plain, hidden_pairs=pairs)
-        with_static = replace(with_static, hidden_pairs=pairs)
-        static = static - pairs * half
+        plain = _add_hidden_pairs(plain, systematic)
+        with_static = _add_hidden_pairs(with_static, systematic)
+    static = spectrum.mean.at(time) - (1 + with_static.hidden_pairs) * half
     mean = max(float(np.mean(half)), 1e-300)
     share = float(np.mean(static)) / mean
 
