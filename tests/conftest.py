@@ -19,8 +19,13 @@ from hypothesis import settings
 
 from d2rpick.base.workers import count_cores
 
-# No deadline, because a busy machine is no error. Every run draws new examples, so 20 instead of 100 are enough.
-settings.register_profile("d2rpick", deadline=None, max_examples=20)
+# A busy machine is no error, so there is no deadline.
+# A commit must pass or fail in the same way each time, so the examples of a test are the same in each run.
+settings.register_profile(
+    "d2rpick", deadline=None, max_examples=20, derandomize=True, database=None
+)
+# New examples: pytest --hypothesis-profile=search
+settings.register_profile("search", deadline=None, max_examples=100)
 settings.load_profile("d2rpick")
 
 # Workers must not compile the tests again either.
