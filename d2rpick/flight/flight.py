@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # Largest work of a load on the parts in a flight, relative to their internal energy [-].
-# This work causes a deformation error of 2 %; smaller errors do not affect the ranking of pairs.
+# Such work changes the deformation by 2 %; smaller changes do not affect the ranking of pairs.
 MOST_WORK: Final = 0.04
-# Sources that must confirm each flight from a more reliable source, because they cover the contacts of all parts.
+# Sources that cover the contacts of all parts, so they must confirm each flight from a more reliable source.
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Sources that may miss a load, because some forces are not written and fixed walls do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
@@ -97,7 +97,7 @@ class Flight(NamedTuple):
 
 
 def _explain_nothing(_: float) -> None:
-    """Return no contradiction for any time, as the default for ``explain_contradiction``."""
+    """Return None for every time; the default for ``explain_contradiction``."""
 
 
 class Witness(NamedTuple):
@@ -124,7 +124,7 @@ class Witness(NamedTuple):
         decisive: bool,
         explain_contradiction: Callable[[float], str | None] = _explain_nothing,
     ) -> Witness:
-        """Make a source of evidence over the times ``time`` (n,) that computes each flight, and their list, once."""
+        """Make a source of evidence for times (n,) that computes each flight, and the list of flights, only once."""
         once = cache(around)
         return cls(
             source,
@@ -142,18 +142,24 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Return the flight around td, searched from a fixed time within it if possible, otherwise from td."""
+        """Return the flight around td.
+
+        The search starts from a fixed time within the flight if possible, otherwise from td.
+        """
         return _find_flight_with_td(self.time, self.around, td)
 
     def counts(self) -> bool:
-        """Return True if a time at which this source shows no flight is certainly in no flight."""
+        """Return True if td is certainly in no flight whenever this source shows none."""
         return self.decisive or bool(self.flights())
 
 
 def _find_flight_with_td(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
-    """Return the flight around ``td``, searched from a time shared by many td if possible, otherwise from td."""
+    """Return the flight around ``td``.
+
+    The search starts from a time shared by many td if possible, otherwise from td.
+    """
     shared = filter(None, map(around, list_marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -175,7 +181,7 @@ def _find_flight_from_middle(
 
 
 class Seen(NamedTuple):
-    """Evidence for a td: the flight around it, or the nearest flight and the reason why td is not in a flight.
+    """Evidence for a td: the flight around td, or the nearest flight and the reason why td is not in a flight.
 
     ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
@@ -422,7 +428,7 @@ def _find_flight_by_energies(
 def _find_flight_by_forces(
     history: History, touches: Touches, td: float
 ) -> FreeFlight | None:
-    """Return the flight around td from contact forces, limited to times with one energy level if the energy rises.
+    """Return the flight around td from contact forces, limited to a period with one energy level if the energy rises.
 
     Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
@@ -450,7 +456,7 @@ def _limit_to_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Limit a flight to the time span in which the internal energy stays on one level; None if td is before that span.
+    """Limit a flight to the period in which the internal energy stays on one level; None if td is before that period.
 
     ``momenta`` are those that show the flight.
     """
@@ -487,7 +493,7 @@ def _limit_to_level(
         driven=isinf(flight.gravity),
     )
     if start is not None and start > flight.start and momenta is not None:
-        # The last sum of energies excludes the work of gravity, whereas the first sum includes it.
+        # The last sum of energies excludes the work of gravity; the first sum includes it.
         whole = None if damped is None else damped[-1 if flight.gravity else 0]
         if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
             start = flight.start
@@ -507,7 +513,7 @@ def _limit_to_level(
 def _find_nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """For a td outside of flights, return the last flight before it if there is one, otherwise the next one."""
+    """For a td outside all flights, return the last flight before td if there is one, otherwise the next flight."""
     flights = witness.flights()
     earlier_flights = [flight for flight in flights if flight.end < td]
     nearest = (
@@ -517,7 +523,7 @@ def _find_nearest(
 
 
 def name_source(source: str | None) -> str:
-    """Return a phrase that names the data that show a flight."""
+    """Return a phrase that names the data from which a flight was found."""
     return str(source).replace("-", " ")
 
 
@@ -556,7 +562,7 @@ def _join_evidence(history: History, *shown_flights: tuple[str, FreeFlight]) -> 
 
 
 def get_agreement_limit(history: History, start: float, end: float) -> float:
-    """Return the largest difference between the ends of a flight in two sources that agree [time]."""
+    """Return the largest difference at which the ends of a flight in two sources agree [time]."""
     return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 

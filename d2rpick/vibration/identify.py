@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Unexplained fraction of the variance above which a fit to 400 samples is refused at once [-].
+# A fit to 400 samples is refused at once if it leaves more than this fraction of the variance unexplained [-].
 HOPELESS: Final = 0.5**2
-# A misfit structure larger than this fraction of the fitted energy at the same time indicates a second mode [-].
+# A systematic misfit larger than this fraction of the fitted energy at the same time indicates a second mode [-].
 MAX_LOCAL_STRUCTURE: Final = 0.1
 # Smallest number of samples to which a mode is fitted, four for each parameter of the largest model.
 MIN_SAMPLES: Final = 24
@@ -49,7 +49,7 @@ _MODELS: Final = (
 
 
 class Identification(NamedTuple):
-    """A mode fitted to an energy history, and whether the mode describes the history.
+    """A mode fitted to an energy history, and whether it describes the history.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ class _Record(NamedTuple):
 
 
 def _refuse_short_record(time: Samples, energy: Samples) -> Identification | None:
-    """Return a refusal if the record is too short to be judged, otherwise None."""
+    """Return a refusal if the record is too short to be judged; otherwise None."""
     if time.size < MIN_SAMPLES:
         states_text = "1 state" if time.size == 1 else f"{time.size} states"
         return _refuse_without_fit(
@@ -344,7 +344,7 @@ def _evaluate_attempt(parameters: Samples, size: int, record: _Record) -> _Attem
 def _judge_attempt(
     attempt: _Attempt, least_periods: float, record: _Record
 ) -> Identification:
-    """Return the result for a fit with its verdict."""
+    """Return the identified mode with the verdict on its fit."""
     s = record.s
     e = record.e
     density = count_samples_per_period(
