@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class FirstRun(NamedTuple):
-    """Result of `first`: the names of the ``files``, the main deck first, and ``notes`` on what is unknown.
+    """Result of `first`: the names of the ``files`` with the main deck first, and ``notes`` on what is unknown.
 
     ``wait`` is the force-free time that counts as flight [time of the deck], ``reason`` its origin.
     """

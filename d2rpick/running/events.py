@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from d2rpick.running.evidence import GrowingEvidence
     from d2rpick.running.witness import Quiet
 
-# Smallest height of the internal energy above its recent minimum at a good tr, relative to its recent range [-].
-# In computed runs, a tr at an energy minimum locked in half of the energy at td, and a tr at a peak 90 % or more.
+# At a good tr, the internal energy exceeds its recent minimum by at least this fraction of its recent range [-].
+# In computed runs, a tr at an energy minimum locked in half of the energy at td; a tr at a peak, 90 % or more.
 _HIGH: Final = 0.75
 _RIGID: Final = (
     "parts have become rigid: part data are not used until they deform again"
@@ -67,7 +67,7 @@ def find_events(evidence: GrowingEvidence) -> tuple[Event, ...]:
             if event.tr is None or not start <= event.tr <= end
         ]
         if start <= history.time[:FEWEST][-1]:
-            continue  # These bodies are always rigid.
+            continue  # These bodies are rigid throughout the run.
         events.append(Event("rigid", start, seen_at, _RIGID))
         if end < history.end:
             events.append(Event("deformable", end, end, "all parts deform again"))
@@ -95,7 +95,7 @@ def _describe_flight(flight: Quiet, evidence: GrowingEvidence) -> Iterator[Event
 
 
 def _describe_start(flight: Quiet) -> Event:
-    """Report that a flight was detected, which evidence shows it, and why it was not detected earlier."""
+    """Report that a flight was detected, on which evidence, and why it was not detected earlier."""
     landing = "landing time unknown"
     if flight.level is not None:
         landing = f"landing at about {flight.level:.4g} if it lands as high as it took off, later if lower"
@@ -156,7 +156,7 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
-    """Return a warning if parts oscillate too strongly in a flight that has lasted up to tr; otherwise empty."""
+    """Return a warning if parts oscillate too strongly in a flight that has lasted until tr; otherwise empty."""
     swing = find_swing(history, flight.start, tr) if flight.parts else None
     if swing is None or swing.flight <= tr - flight.start:
         return ""

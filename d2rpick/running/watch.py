@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     # Inode number of a file, its size, and the time at which it was written [s].
     FileStamp = tuple[int, int, float]
 
-# Largest fraction of a processor core's time that reading may take [-].
+# Reading may take at most this fraction of the time of a processor core [-].
 _SHARE: Final = 0.01
 # _SHORTEST: shortest pause between two reads [s].
-# _LONGEST: longest pause between two reads that cover only new states [s].
+# _LONGEST: longest pause between two reads of only the new states [s].
 _SHORTEST, _LONGEST = 0.5, 5.0
 # A run is reported as silent after this time without output [s].
 _SILENT: Final = 60.0
@@ -64,7 +64,7 @@ class Watch:
         self._error: FormatError | HistoryError | None = None
         self._last_time: float | None = None
         self._report_silence_after = _SILENT
-        self._was_over = False  # True if the run seemed over at the first read.
+        self._was_over = False  # True if the run seemed to be over at the first read.
         self.ended: str | None = None
 
     @property
@@ -90,7 +90,7 @@ class Watch:
                 yield from self._read([*files])
                 self._error = None
             except (FormatError, HistoryError) as error:
-                # The error is not raised, because the solver may be writing to the file at this moment.
+                # No error is raised, because the solver may be writing to the file at this moment.
                 self._error = error
         if self._last_time is not None and files and not self.ended:
             yield from self._check_end([*files][-1])
@@ -157,7 +157,7 @@ class Watch:
             yield from events[kept_count:]
 
     def _describe_first_look(self, now: float) -> str:
-        """Report how far the run is at the first read; if it seems over, refer to ``plan``."""
+        """Report how far the run has got at the first read; if it seems to be over, refer to ``plan``."""
         reached = f"the run has reached {now:.6g}"
         ending = _find_ending([*self._files][-1])
         written = max(written for _, _, written in self._files.values())
@@ -173,7 +173,7 @@ class Watch:
         return f"{reached} and {reason}; choose times with {self._plan}, because the events below are past"
 
     def _check_end(self, name: str) -> Iterator[Event]:
-        """Report once that the run has ended, if the listing next to its last file shows this."""
+        """Report once that the run has ended, if the listing next to its last file shows that."""
         self.ended = _find_ending(name)
         if self.ended:
             event = "failed" if self.ended == WITH_AN_ERROR else "ended"
@@ -190,7 +190,7 @@ def _find_ending(name: str) -> str | None:
 
 
 def _tell_as_past(event: Event) -> Event:
-    """Return an event of a finished run, in which an advice cannot be followed any more."""
+    """Return an event of a finished run; the advice in it can no longer be followed."""
     if event.event not in _ADVICE:
         return event
     message = f"during the run the advice was: {event.message}"
@@ -198,7 +198,7 @@ def _tell_as_past(event: Event) -> Event:
 
 
 def _expect_contact(lost_events: Sequence[Event], now: float) -> Iterator[Event]:
-    """Yield an event that announces the first contact among the events that a restart has undone."""
+    """Yield an event that announces the first of the contacts that a restart has undone."""
     times = [event.time for event in lost_events if event.event == "contact"]
     if times and times[0] is not None and times[0] > now:
         message = "a contact is expected there, as before the restart"
@@ -209,7 +209,7 @@ def follow(
     names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None,
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[Event]:  # fmt: skip
-    """Yield the events of a run until it has ended, or for ``lasting`` [s]; see `Watch` for the other arguments."""
+    """Yield the events of a run until it has ended or for ``lasting`` [s]; see `Watch` for the other arguments."""
     watch = Watch(names, selection, wait, inventory)
     end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
