@@ -136,7 +136,7 @@ def follow(
     Examples
     --------
     >>> import d2rpick as d2
-    >>> [one.event for one in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
+    >>> [event.event for event in d2.follow("sample_data/rolloverT01.gz", parts="box", lasting=0)][:2]
     ['begun', 'load']
     """
     from d2rpick.running import watch  # Imported here to keep start-up fast.

@@ -113,6 +113,26 @@ def name_step_to_card(
     return f"print the cards with {line}{hint}"
 
 
+def name_step_with_pair(
+    situation: Situation,
+    pair: tuple[float, float],
+    better: Pair | None,
+    question: RepeatedQuestion,
+    command: str,
+) -> str:
+    """Return the step with a pair that can be used: to the ``better`` pair or, without one, to the card of the pair."""
+    if better is not None:
+        return name_step_to_better_pair(better, question)
+    return name_step_to_card(
+        situation.history,
+        situation.settings,
+        [pair],
+        question,
+        command,
+        flying=situation.flight.by_parts,
+    )
+
+
 def name_step_to_better_pair(better: Pair, question: RepeatedQuestion) -> str:
     """Return the step that judges a better pair."""
     line = write_command(question, "suggest", "--td", f"{better.td:.6g}")

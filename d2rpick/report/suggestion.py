@@ -21,8 +21,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import list_situation_heading
@@ -230,20 +229,13 @@ def list_next_step(
 ) -> list[tuple[str, str]]:
     """Return the next command: it leads to the card of a usable pair or, failing that, to a better pair."""
     decision = answer.decision
-    situation = answer.situation
     pair = answer.recommended
     if decision is None or pair is None or decision.verdict == DO_NOT_USE:
         step = _name_step_after_refusal(answer, decision, question)
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(pair.tr, pair.td)],
-            question,
-            "suggest",
-            flying=situation.flight.by_parts,
+        times = (pair.tr, pair.td)
+        step = name_step_with_pair(
+            answer.situation, times, decision.better, question, "suggest"
         )
     return [("next", step)]
 

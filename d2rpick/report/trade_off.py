@@ -16,8 +16,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, many, maybe, row, write_csv
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import describe_input
@@ -129,7 +128,6 @@ def list_next_step(
     """Return the next command, which leads to the card of the requested or chosen pair, otherwise to a better pair."""
     offer = trade_off.requested or trade_off.recommended
     decision = trade_off.decide_on(offer) if offer else None
-    situation = trade_off.situation
     if offer is None or offer.tr is None or decision is None:
         step = f"compare all flights with {write_command(question, 'plan')}"
     elif decision.verdict == DO_NOT_USE:
@@ -137,17 +135,14 @@ def list_next_step(
         step = name_step_after_refusal(
             offer.answer.situation, decision.better, question, otherwise, decision
         )
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
         times = ("--td", f"{offer.td:.6g}")
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(offer.tr, offer.td)],
+        step = name_step_with_pair(
+            trade_off.situation,
+            (offer.tr, offer.td),
+            decision.better,
             question._replace(times=times),
             "suggest",
-            flying=situation.flight.by_parts,
         )
     return [("next", step)]
 

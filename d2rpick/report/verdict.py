@@ -18,8 +18,7 @@ from d2rpick.report.decision import (
 from d2rpick.report.fields import Document, Field, get_kind, maybe, row
 from d2rpick.report.next_step import (
     name_step_after_refusal,
-    name_step_to_better_pair,
-    name_step_to_card,
+    name_step_with_pair,
     write_command,
 )
 from d2rpick.report.situation import list_situation_heading
@@ -126,17 +125,9 @@ def list_next_step(
         words = (*question.times, "--report", "verify.html")
         line = write_command(question, "verify", *words)
         step = f"use the results of the switched run; keep the comparison with {line}"
-    elif decision.better is not None:
-        step = name_step_to_better_pair(decision.better, question)
     else:
-        step = name_step_to_card(
-            situation.history,
-            situation.settings,
-            [(answer.candidate.tr, answer.td)],
-            question,
-            "card",
-            flying=situation.flight.by_parts,
-        )
+        pair = (answer.candidate.tr, answer.td)
+        step = name_step_with_pair(situation, pair, decision.better, question, "card")
     return [("next", step)]
 
 

@@ -5,12 +5,12 @@ that run a line with this constant are asked again, until a few answers have cha
 One question of each kind is asked before the next one of any kind.  Every trial is a fork of a process that has
 imported everything and asked nothing.
 
-The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each.  Its rows
+The table docs/developing/deciding-numbers.csv shows how many answers changed, and the first change of each. Its rows
 of deciding constants are kept; constants that have changed no answer so far, or have another value, are tried again,
-with other questions if ``--seed`` is another one.  The table is written after each constant, so ``--resume`` continues a
-stopped run: it keeps all rows of constants that were tried.  A constant that changes no answer is a guard against round-off,
-overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not contain, or not
-needed.
+with other questions if ``--seed`` is another one. The table is written after each constant, so ``--resume`` continues
+a stopped run: it keeps all rows of constants that were tried. A constant that changes no answer is a guard against
+round-off, overflow or damaged input, a limit of time or memory, a threshold of cases that the questions do not
+contain, or not needed.
 """
 
 from __future__ import annotations

@@ -168,54 +168,69 @@ def compare_runs(
         If a run has fewer than three states from td to ``end``.
     """
     tr, td = pair
-    end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    reference_after = reference.between(td, end)[1]
-    states = min(switched.between(td, end)[1].size, reference_after.size)
-    _check_number_of_states(reference, switched, states, td, end)
-    energies_after, energy_rigid = _select_energies_after(switched, td, end)
-    frozen = float(energies_after[0])
+    after = _read_energies_after(reference, switched, td, end)
+    frozen = float(after.switched[0])
     energy_td = reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
+    energy_rigid = after.reported_while_rigid
     if energy_rigid is not None:
         reported = f"the solver reports an energy of {energy_rigid:.6g} while the parts are rigid"
         notes.append(
             f"{reported}; it is not used, because some solvers report wrong energies of rigid solid elements; "
             f"right after td the energy is {frozen:.6g}"
         )
-    still = _find_limit_of_change(reference, switched, tr, td)
-    error = _compute_relative_distance(*momenta, td, end)
-    rigid = _find_rigid_window(switched, tr, td, still)
-    mean = float(energies_after.mean())
-    mean_reference = float(reference_after.mean())
+    error = _compute_relative_distance(*momenta, td, after.end)
+    limit = _find_limit_of_change(reference, switched, tr, td)
+    rigid = _find_rigid_window(switched, tr, td, limit)
     objections = [
         *check_same_model(reference, switched, min(rigid[0] if rigid else tr, tr)),
-        *_check_rigid_window(reference, switched, rigid, tr, td, still),
+        *_check_rigid_window(reference, switched, rigid, tr, td, limit),
     ]
     if is_reported:
-        objections += _check_locked_in_energy(
-            reference, tr, frozen, energy_td, tolerance
-        )
-        if mean_reference > round_off(reference):
-            objections += _check_mean_energy(mean / mean_reference, min_mean)
+        objections += _check_energies_after(reference, after, pair, tolerance, min_mean)
     objections += _check_momentum(error)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=energy_td,
         level_ratio=frozen / energy_td if energy_td > 0 else None,
-        end=end,
-        mean_after=mean,
-        mean_after_reference=mean_reference,
-        spread_after=float(energies_after.std()),
-        spread_after_reference=float(reference_after.std()),
+        end=after.end,
+        mean_after=float(after.switched.mean()),
+        mean_after_reference=float(after.reference.mean()),
+        spread_after=float(after.switched.std()),
+        spread_after_reference=float(after.reference.std()),
         momentum_error=error,
-        displacement=_compute_distance(*centres, td, end),
+        displacement=_compute_distance(*centres, td, after.end),
         rigid_from=rigid and rigid[0],
         rigid_to=rigid and rigid[1],
         objections=tuple(objections),
         notes=tuple(notes),
         min_mean=min_mean,
     )
+
+
+class _EnergiesAfter(NamedTuple):
+    """Energies of both runs at their states from td to ``end`` [time], each of shape (n,) [energy].
+
+    ``reported_while_rigid`` is the energy that the solver reports while the parts are rigid, None if it is right.
+    """
+
+    end: float
+    reference: Samples
+    switched: Samples
+    reported_while_rigid: float | None
+
+
+def _read_energies_after(
+    reference: History, switched: History, td: float, end: float
+) -> _EnergiesAfter:
+    """Return the energies from td to ``end``, or to the end of the shorter record; raise RangeError if too few."""
+    end = min(end, float(reference.time[-1]), float(switched.time[-1]))
+    reference_after = reference.between(td, end)[1]
+    states = min(switched.between(td, end)[1].size, reference_after.size)
+    _check_number_of_states(reference, switched, states, td, end)
+    switched_after, energy_rigid = _select_energies_after(switched, td, end)
+    return _EnergiesAfter(end, reference_after, switched_after, energy_rigid)
 
 
 def _select_energies_after(
@@ -361,6 +376,25 @@ def _check_locked_in_energy(
         )
     if measures.level_error(frozen, energy_td) > tolerance:
         yield f"the frozen energy, {frozen:.6g}, differs from the energy of the reference run at td, {energy_td:.6g}"
+
+
+def _check_energies_after(
+    reference: History,
+    after: _EnergiesAfter,
+    pair: tuple[float, float],
+    tolerance: float,
+    min_mean: float,
+) -> Iterator[str]:
+    """Yield objections to the energies after td: to the locked-in energy, and to the mean energy."""
+    tr, td = pair
+    frozen = float(after.switched[0])
+    yield from _check_locked_in_energy(
+        reference, tr, frozen, reference.energy_at(td), tolerance
+    )
+    mean_reference = float(after.reference.mean())
+    if mean_reference > round_off(reference):
+        share = float(after.switched.mean()) / mean_reference
+        yield from _check_mean_energy(share, min_mean)
 
 
 def _check_mean_energy(share: float, min_mean: float) -> Iterator[str]:
