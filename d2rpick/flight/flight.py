@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from math import isfinite, isinf
 from typing import TYPE_CHECKING, Final
 
@@ -101,45 +101,26 @@ def _explain_nothing(_: float) -> None:
 
 
 class Witness(NamedTuple):
-    """A source of evidence for flights: the flight ``around`` a time, and all ``flights`` in ascending order.
+    """A source of evidence for flights in a history, with times (n,), and the function that searches for a flight.
 
     If ``decisive`` is True, the source can exclude a flight at a time even if it shows no flight anywhere.
     ``explain_contradiction`` returns, for a time at which the momentum alone shows a flight, what speaks against it.
     """
 
+    history: History
     source: str
     time: Samples
-    around: Callable[[float], FreeFlight | None]
-    flights: Callable[[], tuple[FreeFlight, ...]]
+    search: Callable[[float], FreeFlight | None]
     decisive: bool
-    explain_contradiction: Callable[[float], str | None]
+    explain_contradiction: Callable[[float], str | None] = _explain_nothing
 
-    @classmethod
-    def of(
-        cls,
-        source: str,
-        time: Samples,
-        around: Callable[[float], FreeFlight | None],
-        *,
-        decisive: bool,
-        explain_contradiction: Callable[[float], str | None] = _explain_nothing,
-    ) -> Witness:
-        """Make a source of evidence for times (n,) that computes each flight, and the list of flights, only once."""
-        once = cache(around)
-        return cls(
-            source,
-            time,
-            once,
-            cache(
-                partial(
-                    find_all_windows,
-                    time,
-                    partial(_find_flight_from_middle, time, once),
-                )
-            ),
-            decisive,
-            explain_contradiction,
-        )
+    def around(self, moment: float) -> FreeFlight | None:
+        """Return the flight around a time; each flight is searched for only once."""
+        return _search_once(self.history, self.source, moment, search=self.search)
+
+    def flights(self) -> tuple[FreeFlight, ...]:
+        """Return all flights in ascending order; they are searched for only once."""
+        return _list_flights(self.history, self.source, witness=self)
 
     def holding(self, td: float) -> FreeFlight | None:
         """Return the flight around td.
@@ -151,6 +132,27 @@ class Witness(NamedTuple):
     def counts(self) -> bool:
         """Return True if td is certainly in no flight whenever this source shows none."""
         return self.decisive or bool(self.flights())
+
+
+@remember
+def _search_once(
+    _: History,
+    _source: str,
+    moment: float,
+    *,
+    search: Callable[[float], FreeFlight | None],
+) -> FreeFlight | None:
+    """Return the flight that a source of evidence in a history shows around a time."""
+    return search(moment)
+
+
+@remember
+def _list_flights(
+    _: History, _source: str, *, witness: Witness
+) -> tuple[FreeFlight, ...]:
+    """Return all flights that a source of evidence in a history shows, in ascending order."""
+    find_flight = partial(_find_flight_from_middle, witness.time, witness.around)
+    return find_all_windows(witness.time, find_flight)
 
 
 def _find_flight_with_td(
@@ -291,17 +293,10 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
         from d2rpick.flight import momentum
 
         momenta = momentum.select_momenta_for_flight(history.momenta)
-        around = partial(_find_flight_by_momentum, history, momenta)
+        search = partial(_find_flight_by_momentum, history, momenta)
         decisive = any(momentum.can_deny_flight(candidate) for candidate in momenta)
-        yield Witness.of(
-            "momentum",
-            momenta[0].time,
-            around,
-            decisive=decisive,
-            explain_contradiction=partial(
-                _explain_contradicted_momentum, history, momenta
-            ),
-        )
+        explain = partial(_explain_contradicted_momentum, history, momenta)
+        yield Witness(history, "momentum", momenta[0].time, search, decisive, explain)
     forces = history.evidence.forces
     whole = history.find_momenta(of_parts=False)
     touches = None
@@ -313,11 +308,9 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
     balance = history.balance
     is_better_known = bool(history.momenta)
     if touches is not None:
-        by_forces = Witness.of(
-            "contact-force",
-            touches.time,
-            partial(_find_flight_by_forces, history, touches),
-            decisive=False,
+        search = partial(_find_flight_by_forces, history, touches)
+        by_forces = Witness(
+            history, "contact-force", touches.time, search, decisive=False
         )
         is_better_known = is_better_known or bool(by_forces.flights())
         yield by_forces
@@ -326,20 +319,19 @@ def _make_witnesses(history: History) -> Iterator[Witness]:
     from d2rpick.flight import work
 
     if work.has_visible_contacts(balance):
-        around = partial(
+        search = partial(
             _find_flight_by_energies,
             history,
             work.find_plateau,
             level=not is_better_known,
         )
-        yield Witness.of("contact-energy", balance.time, around, decisive=False)
+        yield Witness(history, "contact-energy", balance.time, search, decisive=False)
     if work.has_laws(balance):
-        around = partial(
+        search = partial(
             _find_flight_by_energies, history, work.find_balanced_window, level=True
         )
-        yield Witness.of(
-            "energy-balance", balance.time, around, decisive=balance.worked is not None
-        )
+        is_decisive = balance.worked is not None
+        yield Witness(history, "energy-balance", balance.time, search, is_decisive)
 
 
 def _explain_contradicted_momentum(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,7 +17,7 @@ from d2rpick.vibration.modes import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -159,23 +159,35 @@ def identify(
             time, "the energy does not oscillate: nothing vibrates, or it is overdamped"
         )
     worst = HOPELESS if quick else np.inf
-    fit_some = cache(
-        lambda size: fitting.fit_few(poles, record.s, record.e, size, worst)
-    )
-    if (
-        quick and fit_some(fitting.WITH_PRELOAD) is None
-    ):  # No other model leaves a smaller misfit than the largest model.
-        return _is_out_of_reach(time)
-    fits = (
-        (fitting.fit(fit_some(size), record.s, record.e, size, worst), size, periods)
-        for size, periods in _MODELS
-    )
-    attempts = (
-        (_evaluate_attempt(parameters, size, record), most_periods)
-        for parameters, size, most_periods in fits
-        if parameters is not None
-    )
+    few_fits: dict[int, Samples | None] = {}
+    if quick:
+        # No other model leaves a smaller misfit than the largest model.
+        largest = fitting.WITH_PRELOAD
+        few_fits[largest] = fitting.fit_few(poles, record.s, record.e, largest, worst)
+        if few_fits[largest] is None:
+            return _is_out_of_reach(time)
+    attempts = _fit_models(poles, record, worst, few_fits)
     return _choose_first_to_follow(attempts, record)
+
+
+def _fit_models(
+    poles: NDArray[np.complex128],
+    record: _Record,
+    worst: float,
+    few_fits: Mapping[int, Samples | None],
+) -> Iterator[tuple[_Attempt, float]]:
+    """Yield a fit of each model that is not hopeless, with the number of periods needed to identify the model.
+
+    ``few_fits`` contains fits to a selection of samples that are already known, by the number of parameters.
+    """
+    for size, most_periods in _MODELS:
+        if size in few_fits:
+            few_fit = few_fits[size]
+        else:
+            few_fit = fitting.fit_few(poles, record.s, record.e, size, worst)
+        parameters = fitting.fit(few_fit, record.s, record.e, size, worst)
+        if parameters is not None:
+            yield _evaluate_attempt(parameters, size, record), most_periods
 
 
 def find_rates(time: Samples, energy: Samples) -> NDArray[np.complex128]:
