@@ -52,7 +52,8 @@ COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # Exit code that a shell reports if SIGPIPE ended the program.
 _Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
-
+# Largest difference in similarity between the best match for a mistyped option and others that are suggested [-].
+_LESS_ALIKE: Final = 0.1
 _VERSIONS: Final = (
     "Show the version, and those of the libraries it stands on, and exit."
 )
@@ -100,10 +101,6 @@ class Documented(click.Command):
             for line in (self.epilog or "").split("\n")
         ]
         formatter.write("\n" + "\n".join(lines) + "\n")
-
-
-# An option is also suggested if it resembles the mistyped one less than the best match by at most this [-].
-_LESS_ALIKE: Final = 0.1
 
 
 class _CommandGroup(Documented, click.Group):

@@ -67,6 +67,10 @@ _WRONG_BY_MORE: Final = "the vibration after td is wrong by more than"
 _MORE_OFTEN: Final = "write the energies more often"
 CHOOSE_TIMES_IN_FLIGHT: Final = "choose tr and td in one flight"
 _CORRECT_THE_DECK: Final = "correct the deck, and run the reference again"
+_CHECK_GIVEN_TIMES: Final = (
+    "make sure that no force acts in the flight that you gave, "
+    "or let the evidence decide, without `after` and `landing`"
+)
 # End of the advice on a pair, which is omitted if a finished switched run is already available.
 _OR_COMPARE: Final = ", or compare with a finished switched run"
 
@@ -264,10 +268,6 @@ class Cause(NamedTuple):
 _NOT_CERTAIN: Final = Cause(
     "the flight is not certain",
     "write the part momenta (LS-DYNA matsum, Radioss /TH/PART), or give the end of the load as `after`",
-)
-_CHECK_GIVEN_TIMES: Final = (
-    "make sure that no force acts in the flight that you gave, "
-    "or let the evidence decide, without `after` and `landing`"
 )
 _UNKNOWN_OUTSIDE: Final = Cause(
     "the error of the vibration is unknown, because tr or td lies outside the flight",
