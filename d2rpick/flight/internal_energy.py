@@ -151,9 +151,7 @@ def find_landing_after(history: History, start: float) -> float | None:
 
 
 def find_end_of_load(history: History, td: float) -> float | None:
-    """Return the end of the load, i.e.
-
-    the last time [time] before td at which the energy enters its band; None if unknown.
+    """Return the last time before td at which the energy enters its band, i.e. the end of the load [time].
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
     was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,

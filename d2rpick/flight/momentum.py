@@ -295,9 +295,7 @@ def _list_sets_to_try(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 def _find_attached_parts(
     momenta: Momenta, chosen: Sequence[int], td: float
 ) -> tuple[int, ...]:
-    """Return the attached parts, i.e.
-
-    those for which the deviations of the momenta from straight lines cancel before td.
+    """Return the attached parts, whose deviations of momentum from straight lines cancel out before td.
 
     Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
     the bent momenta, and its projector groups the parts of a body.

@@ -235,10 +235,7 @@ class TimeHistory(Database):
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def find_resume_points(self) -> dict[str, ResumePoint]:
-        """Return the position at which a later read of the file can begin, i.e.
-
-        that of the second-to-last complete state.
-        """
+        """Return the position at which a later read can begin, which is that of the second-to-last complete state."""
         begin = self._records.at + self._stride * max(self._states - 2, 0)
         head = self._data[: self._records.at]
         return {self.source: ResumePoint(head, begin, len(self._data))}
