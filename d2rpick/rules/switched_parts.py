@@ -256,7 +256,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield the kind and id of each part set, part or lead part that a line names and the deck does not define."""
+    """Yield the kind and id of each part set, part or lead part that is named on a line but not defined in the deck."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -329,7 +329,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def _find_bodies(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part in ``first``, keyed by part id.
+    """Return the lead part of the rigid body of each part in ``first``, by part id.
 
     The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """
@@ -398,7 +398,7 @@ def _find_active_constraints(case: Case, *, nodal: bool) -> Iterator[Objection]:
 def _find_parts_of_nodes(
     case: Case, constraints: Sequence[Constraint]
 ) -> dict[int, set[int]]:
-    """Return all parts whose elements contain a node of the constraints, keyed by node id."""
+    """Return all parts whose elements contain a node of the constraints, by node id."""
     cards = find_element_cards(case.deck, searched=True) if constraints else ()
     if not cards:
         return {}
@@ -419,7 +419,7 @@ def _find_held_parts(
 
 
 def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
-    """Return the first of ``parts`` to which each node belongs, keyed by node id."""
+    """Return the first of ``parts`` to which each node belongs, by node id."""
     cards = find_element_cards(case.deck, searched=True)
     if not cards:
         return {}
@@ -430,7 +430,7 @@ def _find_owners(case: Case, parts: Collection[int]) -> dict[int, int]:
 
 
 class _Flags(NamedTuple):
-    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first flag."""
+    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first of these flags."""
 
     nrbf: int
     ncsf: int
@@ -438,7 +438,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have no flags."""
+    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -460,7 +460,7 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
 
 
 def _find_left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
-    """Return the flags of the first card that makes a part rigid and keeps its constraints, keyed by part id."""
+    """Return the flags of the first card that makes a part rigid and keeps its constraints, by part id."""
     first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
         flags = _find_flags(case, event.by)
