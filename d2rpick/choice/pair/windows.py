@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
-from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
+from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
@@ -228,9 +228,9 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
     if not inner.size:
         return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow_brackets(
-        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_HALVINGS
-    ).within
+    return halve_brackets(
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, _HALVINGS
+    )
 
 
 def make_error_profile(

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
 # Values that spreadsheets write, in English and German, when a computation fails.
@@ -39,6 +39,11 @@ _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
+# Pattern of any number of lines with one number each, keyed by decimal sign.
+_NUMBERS: Final = {
+    sign: re.compile(rf"(?:{number.pattern}\n)*+", re.ASCII)
+    for sign, number in _NUMBER.items()
+}
 # Template of the pattern of a number with thousands separators, for a given separator and decimal sign.
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
 # Thousands separators that are tried in addition to "." and ",".
@@ -60,10 +65,10 @@ def split_cells(line: str, separator: str | None) -> list[str]:
     >>> split_cells('"part 3, left", 1.5 ,', ",")
     ['part 3, left', '1.5', '']
     """
-    if '"' not in line and separator is None:
-        return line.split()
     if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)]
+        if separator is None:
+            return line.split()
+        return [*map(str.strip, line.split(separator))]
     sign = separator or " "
     if separator is None:
         line = " ".join(line.split())
@@ -87,6 +92,8 @@ def is_skipped(line: str) -> bool:
     >>> [line for line in ("", "# 1,2", "#DIV/0!,1", "|---|---|", "-1.5,2") if not is_skipped(line)]
     ['#DIV/0!,1', '-1.5,2']
     """
+    if line[:1].isdigit():
+        return False  # Most lines of a table, whose number decides how long this takes.
     line = line.lstrip()
     if not line:
         return True
@@ -112,6 +119,17 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
 def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
     """Return True if a cell contains a number. The number is not computed, because many cells are tested."""
     return _written_number(cell, decimal, thousands) is not None
+
+
+def are_numbers(cells: Iterable[str], decimal: str) -> bool:
+    """Return True if all cells contain numbers in ASCII without thousands separators; much faster than cell by cell.
+
+    Examples
+    --------
+    >>> are_numbers(["1", "-2.5e3"], "."), are_numbers(["1", ""], ".")
+    (True, False)
+    """
+    return _NUMBERS[decimal].fullmatch("\n".join([*cells, ""])) is not None
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:

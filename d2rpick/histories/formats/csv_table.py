@@ -10,7 +10,12 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import has_number, is_skipped, split_cells
+from d2rpick.histories.formats.cells import (
+    are_numbers,
+    has_number,
+    is_skipped,
+    split_cells,
+)
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import (
     Layout,
@@ -364,6 +369,8 @@ class Table(Database):
     @cached_property
     def _printed(self) -> list[list[str]]:
         """The sampled rows of the table itself, without rows after the end of a curve and lines below the table."""
+        if are_numbers((row[self._time] for row in self._sample), "."):
+            return self._sample
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from itertools import islice
+from itertools import chain, islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.cells import (
+    are_numbers,
     find_thousands,
     has_number,
     is_missing,
@@ -145,6 +146,8 @@ def _add_header(table: Layout, header: Header) -> Layout:
 
 def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
     """Add the thousands separator without which some cells of ``rows`` would not be numbers."""
+    if are_numbers(chain.from_iterable(rows), table.decimal):
+        return table
     odd = [
         cell
         for row in rows
@@ -213,6 +216,8 @@ def _find_rows(
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split_cells(line, sign)) for i, line in sample]
+            if sum(len(row) > 1 for _, row in cells) <= best_count:
+                continue  # Fewer rows than with an earlier form.
             if with_groups:
                 thousands = find_thousands(
                     [cell for _, row in cells for cell in row], decimal
@@ -250,7 +255,7 @@ def _find_numbers_in_row(
     # Most lines have only one cell, because most of the separators tried are wrong.
     if len(cells) < 2:
         return ()
-    written = [form.number(cell) is not None for cell in cells]
+    written = [has_number(cell, form.decimal, form.thousands) for cell in cells]
     numbers = tuple(
         number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
     )
