@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
 _COMMENTS: Final = ("#", "$", "%", "//")
 # Values that spreadsheets write, in English and German, when a computation fails.
@@ -39,11 +40,6 @@ _NUMBER: Final = {
     "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
-# Pattern of any number of lines with one number each, keyed by decimal sign.
-_NUMBERS: Final = {
-    sign: re.compile(rf"(?:{number.pattern}\n)*+", re.ASCII)
-    for sign, number in _NUMBER.items()
-}
 # Template of the pattern of a number with thousands separators, for a given separator and decimal sign.
 _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"
 # Thousands separators that are tried in addition to "." and ",".
@@ -121,15 +117,32 @@ def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
     return _written_number(cell, decimal, thousands) is not None
 
 
-def are_numbers(cells: Iterable[str], decimal: str) -> bool:
-    """Return True if all cells contain numbers in ASCII without thousands separators; much faster than cell by cell.
+def split_columns_of_numbers(
+    lines: Sequence[str], separator: str | None, decimal: str, columns: int
+) -> list[list[str]] | None:
+    """Return the cells of each column if all lines have ``columns`` plain numbers, otherwise None; for many lines.
 
     Examples
     --------
-    >>> are_numbers(["1", "-2.5e3"], "."), are_numbers(["1", ""], ".")
-    (True, False)
+    >>> split_columns_of_numbers(["0,1.5", "1,-2e3"], ",", ".", 2)
+    [['0', '1'], ['1.5', '-2e3']]
+    >>> split_columns_of_numbers(["0,1.5", "1,n/a"], ",", ".", 2)
     """
-    return _NUMBERS[decimal].fullmatch("\n".join([*cells, ""])) is not None
+    if separator is None or separator == decimal:
+        return None
+    rows = "\n".join([*lines, ""])
+    if not _compile_rows(separator, decimal, columns).fullmatch(rows):
+        return None
+    cells = rows.replace("\n", separator).split(separator)[:-1]
+    return [cells[column::columns] for column in range(columns)]
+
+
+@lru_cache
+def _compile_rows(separator: str, decimal: str, columns: int) -> re.Pattern[str]:
+    """Return the pattern of any number of rows, each ending with a line feed, of ``columns`` plain numbers."""
+    number = _NUMBER[decimal].pattern
+    further = f"(?:{re.escape(separator)}{number}){{{columns - 1}}}"
+    return re.compile(rf"(?:{number}{further}\n)*+", re.ASCII)
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:

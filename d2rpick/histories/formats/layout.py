@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from itertools import chain, islice
+from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.cells import (
-    are_numbers,
     find_thousands,
     has_number,
     is_missing,
@@ -144,14 +143,12 @@ def _add_header(table: Layout, header: Header) -> Layout:
     )
 
 
-def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator without which some cells of ``rows`` would not be numbers."""
-    if are_numbers(chain.from_iterable(rows), table.decimal):
-        return table
+def add_thousands(table: Layout, columns: Sequence[Sequence[str]]) -> Layout:
+    """Add the thousands separator without which some cells of the columns would not be numbers."""
     odd = [
         cell
-        for row in rows
-        for cell in row
+        for cells in columns
+        for cell in cells
         if not has_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     if odd:
