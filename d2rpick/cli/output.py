@@ -292,8 +292,8 @@ class Output:
         """Exit with code 1, because the finished switched run disagrees with the reference run."""
         if not self.exit_zero:
             tell(
-                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run failed, which --min-quality does "
-                "not accept"
+                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run failed, which --min-quality "
+                "does not accept"
             )
         self.finish(objection=True)
 
