@@ -235,7 +235,7 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
             error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
-            yield f"{name} = {value!r} is rounded to {text} ({error})."
+            yield f"{name} = {value:.12g} is rounded to {text} ({error})."
 
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
