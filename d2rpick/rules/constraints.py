@@ -316,14 +316,15 @@ def _check_separated_parts(case: Case) -> Iterator[Objection]:
     "extra nodes, a joint or a weld on a switched part stays active (NRBF, NCSF)",
 )
 def _check_other_constraints(case: Case) -> Iterator[Objection]:
-    """Extra nodes, joints, spotwelds, rivets and generalized welds constrain nodes. On a part that a card makes rigid,
-    these nodes also belong to its rigid body. According to the vendor, such constraints are invalid for a rigid body:
-    they must be deleted while the part is rigid, and activated again when it is switched back. NCSF deletes spotwelds
-    and nodal constraints such as rivets, and NRBF deletes generalized welds. No available source states which flag
-    deletes joints and extra nodes, so NRBF 1 or NCSF 1 satisfies this rule.
+    """Extra nodes, joints, spotwelds, rivets, generalized welds and constrained node sets constrain nodes. On a part
+    that a card makes rigid, these nodes also belong to its rigid body. According to the vendor, such constraints are
+    invalid for a rigid body: they must be deleted while the part is rigid, and activated again when it is switched
+    back. NCSF deletes spotwelds and other nodal constraints, such as rivets and constrained node sets. NRBF deletes
+    generalized welds. No available source states which flag deletes joints and extra nodes, so NRBF 1 or NCSF 1
+    satisfies this rule.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
-    spotwelds and rivets, NRBF for generalized welds, both for joints and extra nodes. If the constraint joins parts
+    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint joins parts
     that do not become one rigid body, merge them by LRB first (D2R121).
     """
     return _find_active(case, _OTHERS, "D2R121")
@@ -352,7 +353,7 @@ def _check_separated_joints(case: Case) -> Iterator[Objection]:
     nodal rigid bodies on the parts, which NRBF 1 deletes. Source: vendor keyword data for NRBF, NCSF and LRB. It is not
     tested whether the flags act on joints and extra nodes, so the rule only warns.
 
-    Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, as a door on its
+    Fix: Switch all parts and merge them by LRB. If they move relative to each other in the flight, like a door on its
     hinge, keep all of them deformable.
     """
     return _find_separating(case, _OTHERS)
