@@ -20,7 +20,7 @@ _NAMES = {
     "api.running": "FirstRun first follow",
     "api.runs": "Run from_frame read",
     "api.studies": "Study study",
-    "running.events": "Event",
+    "report.follow": "Event",
     "vibration.oscillator": "Oscillator",
     "choice.parts.cost": "Weights",
 }

@@ -108,10 +108,12 @@ class Cores(Farm):
         self._pool = self._new(processes)
         self._is_closed = False
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._is_closed = True
         self._leash.close()
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
+        if kind is not KeyboardInterrupt:
+            self._pool.shutdown(wait=False, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
