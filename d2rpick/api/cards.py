@@ -207,15 +207,19 @@ class Cards:
         """
         from d2rpick.deck.printing import find_solver
 
-        printing, notes = self._suit_deck(question)
         parts = parse_id_ranges("--part", question.on_card)
+        printing, notes = self._suit_deck(question, parts)
         printing = self.replace_in(printing, parts)
         history_format = question.reference.history.format
         self.check_solver(printing.solver or find_solver(history_format))
         return printing, notes
 
-    def _suit_deck(self, question: RunQuestion) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
+    def _suit_deck(
+        self, question: RunQuestion, parts_on_card: Sequence[int]
+    ) -> tuple[Printing, tuple[str, ...]]:
+        """Return what the deck of the run requires of a card, and notes on rigid bodies that are missing from the deck.
+
+        ``parts_on_card`` are the parts to switch if the history has no parts.
 
         The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
         deleted, and the rigid bodies that switch the parts.
@@ -229,7 +233,8 @@ class Cards:
         from d2rpick.deck.printing import SOLVERS
         from d2rpick.deck.suiting import find_suiting
 
-        parts = [part.id for part in question.reference.history.parts or ()]
+        history_parts = question.reference.history.parts or ()
+        parts = parts_on_card or [part.id for part in history_parts]
         suiting = find_suiting(deck, parts)
         solver = self.solver or suiting.solver
         printing = printing._replace(solver=solver)
@@ -352,18 +357,12 @@ def judge_and_print(
     """
     from d2rpick.api.card_in_deck import collect_objections
     from d2rpick.choice.answers import verify_run
-    from d2rpick.choice.judged_card import (
-        add_deck_bodies,
-        complete_printing,
-        print_judged_card,
-    )
+    from d2rpick.choice.judged_card import complete_printing, print_judged_card
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 
     reference = question.reference
     printing, notes = cards.complete(question)
-    printing = complete_printing(
-        add_deck_bodies(printing, question.settings), reference.history
-    )
+    printing = complete_printing(_add_bodies(printing, question), reference.history)
     judge = judge or partial(verify_run, reference, settings=question.settings)
     result = print_judged_card(windows, reference.history, judge, printing, done)
     solver = SOLVERS[printing.solver or DEFAULT]
@@ -376,6 +375,19 @@ def judge_and_print(
     else:
         apart = len(printing.part)
     return JudgedCard(card, verdicts, tuple(collect_objections(card, question, apart)))
+
+
+def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
+    """Add the rigid bodies that the parts of a card become according to the deck."""
+    from d2rpick.choice.judged_card import add_deck_bodies
+
+    settings = question.settings
+    if question.on_card and question.model and question.deck:
+        from d2rpick.choice.parts.deck_of_run import find_rigid_bodies
+
+        bodies = find_rigid_bodies(question.model.inventory, printing.part)
+        settings = replace(settings, bodies=bodies)
+    return add_deck_bodies(printing, settings)
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:

@@ -329,6 +329,8 @@ def verify(
     )
     times = options.write_times(tr=tr, td=td, switched=switched)
     output.answer(answer, question=question.repeated._replace(times=times))
+    if answer.switched and answer.switched.objections:
+        output.finish_with_failed_comparison()
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
 
 

@@ -288,6 +288,15 @@ class Output:
             )
         self.finish(objection=True)
 
+    def finish_with_failed_comparison(self) -> None:
+        """Exit with code 1, because the finished switched run disagrees with the reference run."""
+        if not self.exit_zero:
+            tell(
+                f"d2rpick: exit code {OBJECTION}: the comparison with the switched run failed, which --min-quality "
+                "does not accept"
+            )
+        self.finish(objection=True)
+
     def write(self, name: str, content: bytes) -> None:
         """Write a file completely or not at all; raise D2RPickError if the file cannot be written."""
         from pathlib import Path

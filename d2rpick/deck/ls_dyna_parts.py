@@ -14,11 +14,12 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_columns import (
     ENTITY,
     EXTRA_NODES,
-    GENERALIZED_WELD,
     JOINT,
     MATERIAL,
+    MERGED_BODIES,
     NODAL_BODY,
     NODE_PAIR,
+    NODE_SET,
     PART,
     PART_INERTIA,
     SECTION,
@@ -51,7 +52,11 @@ _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Node sets of each deck that have been read.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
-# Solid formulations, by ELFORM, that keep their stresses in global axes; 0 and 9 are co-rotational.
+# Nodes of the nodal rigid body to which each node belongs, of each deck that has been read.
+_NODAL_BODIES: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
+    WeakKeyDictionary()
+)
+# Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -414,12 +419,21 @@ def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
 
 
 Kind = Literal[
-    "nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"
+    "nodal rigid body",
+    "extra nodes",
+    "joint",
+    "spotweld",
+    "rivet",
+    "generalized weld",
+    "constrained node set",
 ]
 
 
 class Constraint(NamedTuple):
-    """A constraint: its kind, field, id (0 if it has none), nodes, and the rigid part to which it belongs."""
+    """A constraint: its kind, field, id (0 if it has none), nodes, and the rigid part to which it belongs.
+
+    The nodes of a joint include all nodes of the nodal rigid bodies that it connects.
+    """
 
     kind: Kind
     place: CardField
@@ -467,7 +481,7 @@ def _read_extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
 
-def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+def _read_joint(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the joint on a card."""
     if card.name.startswith(
         (
@@ -482,7 +496,21 @@ def _read_joint(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
             number = card.integer(card.lines[0], ENTITY["ID"]).value
         else:
             number = 0
-        yield _read_node_list(card, row, kind, JOINT, number)
+        joint = _read_node_list(card, row, kind, JOINT, number)
+        bodies = _map_nodal_bodies(deck)
+        further = (bodies.get(node, frozenset()) for node in joint.nodes)
+        yield joint._replace(nodes=joint.nodes.union(*further))
+
+
+def _map_nodal_bodies(deck: Deck) -> Mapping[int, frozenset[int]]:
+    """Return the nodes of the nodal rigid body to which each node belongs, keyed by node id."""
+    if deck not in _NODAL_BODIES:
+        _NODAL_BODIES[deck] = {
+            node: body.nodes
+            for body in read_constraints(deck, "nodal rigid body")
+            for node in body.nodes
+        }
+    return _NODAL_BODIES[deck]
 
 
 def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
@@ -491,10 +519,10 @@ def _read_node_pairs(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     return (_read_node_list(card, row, kind, NODE_PAIR) for row in rows)
 
 
-def _read_generalized_weld(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    """Yield the generalized weld on a card."""
+def _read_constrained_set(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Yield the constraint of a node set on a card."""
     for row in _get_first_line(card):
-        members = card.integer(row, GENERALIZED_WELD["NSID"])
+        members = card.integer(row, NODE_SET["NSID"])
         yield Constraint(
             kind,
             members.field,
@@ -528,8 +556,25 @@ _CONSTRAINTS: Final[
     "joint": ("CONSTRAINED_JOINT", _read_joint),
     "spotweld": ("CONSTRAINED_SPOTWELD", _read_node_pairs),
     "rivet": ("CONSTRAINED_RIVET", _read_node_pairs),
-    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_generalized_weld),
+    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _read_constrained_set),
+    "constrained node set": ("CONSTRAINED_NODE_SET", _read_constrained_set),
 }
+
+
+CONSTRAINT_KINDS: Final = tuple(_CONSTRAINTS)
+
+
+def read_merged_bodies(deck: Deck) -> Iterator[tuple[CardField, frozenset[int]]]:
+    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body."""
+    for card in deck.named("CONSTRAINED_RIGID_BODIES"):
+        for row in card.data:
+            values = card.numbers(row, MERGED_BODIES)
+            ids = (
+                value.value + card.transform.part
+                for value in values
+                if not value.problem and value.value > 0
+            )
+            yield values[0].field, frozenset(ids)
 
 
 class Entity(NamedTuple):

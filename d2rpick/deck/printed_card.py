@@ -70,7 +70,8 @@ class Printing(NamedTuple):
     speed : float, optional
         Speed at which the parts approach the contact [length/time].
     delete_nodal_bodies, delete_node_sets : bool
-        LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
+        LS-DYNA: delete nodal rigid bodies and generalized welds (NRBF), or other constraints (NCSF), while the parts
+        are rigid.
     replaced : tuple of int
         Main nodes of the bodies that new bodies replace.
     """

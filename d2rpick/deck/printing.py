@@ -57,9 +57,14 @@ _LEFT_ACTIVE = (
     "  (NRBF, NCSF, RWF 0). If there are any, set 1 (delete) on the first card and",
     "  2 (activate again) on the second.",
 )
-_DELETED = (
-    "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
-    "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
+_NODAL_BODIES_DELETED = (
+    "Nodal rigid bodies and generalized welds of the deck, which all lie on these",
+    "  parts, are deleted (NRBF 1) while these are rigid, and activated again (2).",
+)
+_NODE_SETS_DELETED = (
+    "Joints, extra nodes, spotwelds and other nodal constraints of the deck, which",
+    "  all lie on these parts, are deleted (NCSF 1) while these are rigid, and",
+    "  activated again (2).",
 )
 _SEPARATE = (
     "CHECK BEFORE USE: each part becomes a rigid body of its own (LRB 0). This is",
@@ -230,15 +235,18 @@ def _note_roundings(times: Times, texts: tuple[str, str]) -> Iterator[str]:
     for name, value, text in zip(("tr", "td"), times, texts, strict=True):
         if float(text) != value:
             error = f"nearest in {LONGEST} characters, error {float(text) - value:+.1e}"
-            yield f"{name} = {value!r} is rounded to {text} ({error})."
+            yield f"{name} = {value:.12g} is rounded to {text} ({error})."
 
 
 def _write_warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     """Yield the comment lines of an LS-DYNA card."""
-    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    deleted = (
+        *(_NODAL_BODIES_DELETED if printing.delete_nodal_bodies else ()),
+        *(_NODE_SETS_DELETED if printing.delete_node_sets else ()),
+    )
     yield from (
         *PHYSICS,
-        *(_DELETED if deleted else _LEFT_ACTIVE),
+        *(deleted or _LEFT_ACTIVE),
         "Springs and dampers are not switched.",
         _CAPPED,
     )

@@ -54,8 +54,12 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
             "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
         )
     deck = read_deck(path)
-    bodies = [*read_constraints(deck, "nodal rigid body")]
-    further = [*read_constraints(deck, "extra nodes", "joint")]
+    bodies = [*read_constraints(deck, "nodal rigid body", "generalized weld")]
+    further = [
+        *read_constraints(
+            deck, "extra nodes", "joint", "spotweld", "rivet", "constrained node set"
+        )
+    ]
     nodal, by_set = (
         _is_on_parts(constraints, parts, deck) for constraints in (bodies, further)
     )
@@ -99,9 +103,8 @@ def _is_on_parts(
     nodes_elsewhere = find_first_parts(cards, other_parts)
     return all(
         constraint.part in parts
-        or (
-            constraint.nodes & nodes_on_parts.keys()
-            and not constraint.nodes & nodes_elsewhere.keys()
-        )
+        if constraint.part
+        else constraint.nodes & nodes_on_parts.keys()
+        and not constraint.nodes & nodes_elsewhere.keys()
         for constraint in constraints
     )

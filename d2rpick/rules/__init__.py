@@ -22,7 +22,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.radioss_files import HEAD, is_radioss
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
-from d2rpick.rules import reading, runs, sets, switched_parts, times
+from d2rpick.rules import constraints, reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
 from d2rpick.rules.rule import Rule
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
-_MODULES = (reading, sets, times, switched_parts, runs)
+_MODULES = (reading, sets, times, switched_parts, constraints, runs)
 _ALL = (
     value
     for module in _MODULES

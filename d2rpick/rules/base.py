@@ -14,8 +14,10 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import CardField
 from d2rpick.deck.ls_dyna_columns import DATABASE
 from d2rpick.deck.ls_dyna_parts import (
+    CONSTRAINT_KINDS,
     Constraint,
     DeckParts,
+    find_element_cards,
     read_constraints,
     read_parts,
     read_sections,
@@ -246,10 +248,20 @@ class Case:
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
-        """Return the nodal rigid bodies, extra nodes and joints of the deck, which may belong to a switched part."""
-        return [
-            *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
-        ]
+        """Return the constraints of the deck that may belong to a switched part."""
+        return [*read_constraints(self.deck, *CONSTRAINT_KINDS)]
+
+    @cached_property
+    def parts_of_constrained_nodes(self) -> Mapping[int, set[int]]:
+        """Return all parts whose elements contain a node of a constraint, keyed by node id."""
+        cards = find_element_cards(self.deck, searched=True) if self.constraints else ()
+        if not cards:
+            return {}
+        # Imported here to keep start-up fast.
+        from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes
+
+        nodes = (constraint.nodes for constraint in self.constraints)
+        return find_parts_of_nodes(cards, frozenset[int]().union(*nodes))
 
     @cached_property
     def made_rigid(self) -> tuple[SwitchEvent, ...]:
