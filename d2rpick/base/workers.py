@@ -108,10 +108,18 @@ class Cores(Farm):
         self._pool = self._new(processes)
         self._is_closed = False
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
+        """End all processes.
+
+        The thread of the pool is awaited: until Python 3.12, the pool's own handler at exit may use a pipe that this
+        thread is just closing, and prints a traceback.  After an interrupt nothing is awaited, to be sure to end.
+        """
         self._is_closed = True
         self._leash.close()
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        is_interrupted = error_type is not None and issubclass(
+            error_type, KeyboardInterrupt
+        )
+        self._pool.shutdown(wait=not is_interrupted, cancel_futures=True)
 
     def answers(
         self, function: Callable[[Item], Result], items: Iterable[Item]
