@@ -44,7 +44,6 @@ from d2rpick.report.formats import FORMATS, WrittenDeck, write
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import RunQuestion
-    from d2rpick.api.checking import Findings
     from d2rpick.api.plans import Plan
     from d2rpick.base.errors import Caution
 
@@ -101,6 +100,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     """
     from d2rpick.api.runs import extract_columns
     from d2rpick.report.history_files import TABLES, choose_history_format, write_table
+    from d2rpick.report.next_step import name_step_after_extract
 
     form = write_as or choose_history_format(output.output_file, TABLES)
     selection = request.selection()
@@ -108,6 +108,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
         table, notes = extract_columns(run.files, selection)
     output.notes(notes, ())
     output.content(write_table(form, table))
+    if output.file:
+        output.next_step(name_step_after_extract(output.file))
 
 
 @options.make_command
@@ -178,7 +180,7 @@ def suggest(
                 for caution in collect_cautions(judged_card)
                 if caution not in answer.cautions
             ]
-        output.card(judged_card, new_cautions)
+        output.card(judged_card, new_cautions, question.repeated, request.deck)
         decision = judged_card.worst if judged_card else None
     else:
         times = options.write_times(td=td, td_window=td_window)
@@ -328,7 +330,11 @@ def verify(
         answer, lambda: answer.page(options.repeat_command(), request.judging(), cards)
     )
     times = options.write_times(tr=tr, td=td, switched=switched)
-    output.answer(answer, question=question.repeated._replace(times=times))
+    output.answer(
+        answer,
+        question=question.repeated._replace(times=times),
+        page=output.report or "",
+    )
     if answer.switched and answer.switched.objections:
         output.finish_with_failed_comparison()
     _finish_answer(output, question, answer.decision, question.settings.min_quality)
@@ -481,16 +487,21 @@ def plan(
     judged_card = (
         answer.printed(cards, every=every) if form == "card" or write_deck else None
     )
+    checked, passed, written = ("", True, None)
     if judged_card and write_deck:
-        checked, findings = _write_and_check(judged_card, answer, write_deck, output)
-        passed = findings.passed
-        written = WrittenDeck(write_deck, passed, not findings.has_only_infos)
-    else:
-        checked, passed, written = ("", True, None)
+        checked, written = _write_and_check(judged_card, answer, write_deck, output)
+        passed = written.passed
+    elif write_deck:
+        checked = f"no deck was written to {make_printable(write_deck)}, because no window can be used"
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        passed &= output.card(judged_card, _select_new_cautions(judged_card, answer))
+        passed &= output.card(
+            judged_card,
+            _select_new_cautions(judged_card, answer),
+            question.repeated,
+            request.deck,
+        )
     else:
         if judged_card:
             output.notes(judged_card.card.notes, ())
@@ -538,18 +549,20 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
 
 def _write_and_check(
     card: JudgedCard, plan: Plan, folder: str, output: Output
-) -> tuple[str, Findings]:
+) -> tuple[str, WrittenDeck]:
     """Write the copy of the deck and check it against the history.
 
     Returns
     -------
     text : str
         The written files, and below them the output of ``check --history`` for the deck.
-    findings : Findings
-        What the check found.
+    written : WrittenDeck
+        The folder, and whether the check found something.
     """
     from d2rpick.api.plans import write_planned_deck
 
     names, checked = write_planned_deck(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {make_printable(name)}" for name in names]
-    return "\n".join([*listed, "", checked.text("table", output.shown())]), checked
+    written = WrittenDeck(folder, checked.passed, not checked.has_only_infos)
+    text = checked.text("table", output.shown(written_deck=written))
+    return "\n".join([*listed, "", text]), written

@@ -140,7 +140,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
     )  # restart files of the starter, and those that may still be needed
     result = run(*prepare_drive(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in result
-    assert "no level at td is matched" in result
+    assert "tr is not matched to the energy at td" in result
     assert "--resume" in read_refusal(*prepare_drive(folder))
     over = run(*prepare_drive(folder, "--resume"))
     assert (
@@ -570,7 +570,9 @@ def test_what_a_run_lacks_is_told_before_anything_is_computed(
     assert message in read_refusal(*words, *options)
     assert not (tmp_path / "run").exists()
     if "--engine" in options:
-        assert "missing   /no/such/engine" in run(*words, *options, "--dry-run").stdout
+        planned = run(*words, *options, "--dry-run")
+        assert planned.exit_code == 1
+        assert "there is no program '/no/such/engine'" in planned.stdout
     else:
         assert message in read_refusal(*words, *options, "--dry-run")
 
