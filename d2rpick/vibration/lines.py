@@ -84,9 +84,9 @@ class Grid(NamedTuple):
         """Return the time from the first block to the last block [time]."""
         return float(self.time[-1] - self.time[0])
 
-    def first(self, count: int) -> Grid:
-        """Return a grid with the first ``count`` blocks."""
-        return self._replace(time=self.time[:count], energy=self.energy[:count])
+    def some(self, blocks: slice) -> Grid:
+        """Return a grid with some successive blocks."""
+        return self._replace(time=self.time[blocks], energy=self.energy[blocks])
 
     def waves(self, poles: Complex) -> Complex:
         """Return exp(p (t - t_0)) at the m times t of the grid, where t_0 is the first time; shape (m, poles) [-].
@@ -281,8 +281,9 @@ def predict(grid: Grid) -> Prediction | None:
     )
     if not swing > 0:
         return None
-    first = grid.first(int(FIRST_PART * grid.time.size))
-    rest_of_grid = slice(first.time.size, None)
+    size_of_first = int(FIRST_PART * grid.time.size)
+    first = grid.some(slice(size_of_first))
+    rest = grid.some(slice(size_of_first, None))
     space = _SignalSpace.of(first)
     tried: list[tuple[float, int, bool, Spectrum]] = []
     for order in _ORDERS:
@@ -291,10 +292,8 @@ def predict(grid: Grid) -> Prediction | None:
         poles = space.poles(order)
         for every_decay in (False, True):
             spectrum = fit_spectrum(first, poles, grid.span, every_decay=every_decay)
-            predicted = spectrum.average_blocks(grid).at(grid.time[rest_of_grid])
-            error = float(
-                np.sqrt(np.mean((predicted - grid.energy[rest_of_grid]) ** 2))
-            )
+            predicted = _average_blocks(spectrum, rest)
+            error = float(np.sqrt(np.mean((predicted - rest.energy) ** 2)))
             missed = float(np.hypot(error, spectrum.error)) / swing
             if not tried or missed < _get_needed(tried[-1][3]) * tried[-1][0]:
                 tried.append((missed, order, every_decay, spectrum))
@@ -325,7 +324,10 @@ class _SignalSpace:
     def of(cls, grid: Grid) -> _SignalSpace:
         """Compute the signal subspace of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
-        windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        # A copy, which is multiplied by itself in half the time of overlapping views.
+        windows = np.ascontiguousarray(
+            np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        )
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property
@@ -372,6 +374,17 @@ def fit_weights(grid: Grid, lines: Complex, mean: Complex) -> Spectrum:
         Exponentials(mean, weights[count:], origin),
         remainder,
     )
+
+
+def _average_blocks(spectrum: Spectrum, grid: Grid) -> Samples:
+    """Return the means of a spectrum over the blocks of a grid, shape (m,) [energy]."""
+    parts = (spectrum.lines, spectrum.mean)
+    poles = np.concatenate([part.poles for part in parts])
+    weights_at_start = np.concatenate(
+        [part.weights * part.waves(grid.time[0]) for part in parts]
+    )
+    means = grid.waves(poles) @ (weights_at_start * grid.gain(poles))
+    return np.asarray(means.real)
 
 
 def _split(
