@@ -84,7 +84,7 @@ def list_solvers() -> Sequence[str]:
 
 
 def explain_unknown_solver(name: object) -> str:
-    """Return the message about a name that is not a solver, with the most similar solver name."""
+    """Return the message about a name that is not a solver, with the most similar name of a solver."""
     from d2rpick.histories.names import suggest_name
 
     solvers = list_solvers()
@@ -217,7 +217,7 @@ class Cards:
     def _suit_deck(
         self, question: RunQuestion, parts_on_card: Sequence[int]
     ) -> tuple[Printing, tuple[str, ...]]:
-        """Return what the deck of the run requires of a card, and notes on rigid bodies that are missing from the deck.
+        """Return what the deck of the run requires of a card, with notes on rigid bodies that the deck lacks.
 
         ``parts_on_card`` are the parts to switch if the history has no parts.
 
@@ -261,7 +261,7 @@ class Cards:
         ), bodies.notes
 
 
-# Keys of the settings that apply to all commands; all other keys apply to the rules or to a single command.
+# Keys of the settings that apply to all commands. All other keys apply to the rules or to a single command.
 SETTINGS: Final = (*map(make_option_name, (*OPTIONS, *list_options(Cards))), "fail-on")
 
 
@@ -304,7 +304,7 @@ def parse_id_ranges(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, and a verdict on each of its new windows for the printed times; ``str`` returns the text of the card.
+    """A card with a verdict on each new window for the printed times; ``str`` returns the text of the card.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
     ``cautions`` are the findings of `check` with the card in the deck of the run; if there is no deck, they name what
@@ -348,7 +348,7 @@ def judge_and_print(
     judge: Callable[[float, float], PairVerdict] | None = None,
     done: Sequence[Times] = (),
 ) -> JudgedCard:
-    """Print the card for windows, and judge their printed times as `verify` does, or by calling ``judge``.
+    """Print the card for windows, and judge their printed times as `verify` does or by a call of ``judge``.
 
     Raises
     ------
@@ -391,7 +391,7 @@ def _add_bodies(printing: Printing, question: RunQuestion) -> Printing:
 
 
 def collect_cautions(card: JudgedCard) -> tuple[Caution, ...]:
-    """Return the cautions of a card and of its verdicts, each once, with a caution for each verdict that fails."""
+    """Return the cautions of a card and of its verdicts, each only once, with one for each verdict that fails."""
     of_verdicts = (
         caution
         for verdict in card.verdicts
@@ -417,7 +417,7 @@ def card(
     parts: Parts | None = None,
     **options: Unpack[Judging],
 ) -> JudgedCard:
-    """Print solver input for switching windows, as ``d2rpick card`` does; if a run is given, judge the windows.
+    """Print solver input for switching windows, as ``d2rpick card`` does. If a run is given, judge the windows.
 
     Parameters
     ----------
@@ -470,7 +470,7 @@ def card(
 def print_card(
     windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
 ) -> JudgedCard:
-    """Print the card for windows; if there is a run, use it to judge the printed times."""
+    """Print the card for windows. If a run is given, judge the printed times with it."""
     from d2rpick.deck.printing import SOLVERS, find_solver, print_cards
 
     if run is None:
@@ -488,7 +488,7 @@ def print_card(
 
 
 def _complete_alone(request: Request, cards: Cards) -> Printing:
-    """Return the options of a card that has no history; raise ArgumentError if an option is missing."""
+    """Return the options of a card without a history; raise ArgumentError if an option is missing."""
     from d2rpick.deck.printed_card import Printing
     from d2rpick.deck.printing import DEFAULT, SOLVERS
 

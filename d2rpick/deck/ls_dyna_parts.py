@@ -52,11 +52,11 @@ _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 # Node sets of each deck that have been read.
 _NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()
-# Nodes of the nodal rigid body to which each node belongs, of each deck that has been read.
+# Nodes of the nodal rigid body to which each node belongs, by deck.
 _NODAL_BODIES: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
     WeakKeyDictionary()
 )
-# Solid formulations that keep their stresses in global axes, keyed by ELFORM; 0 and 9 are co-rotational.
+# Solid formulations, by ELFORM, that keep their stresses in global axes; 0 and 9 are co-rotational.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
     -1: "8 points, selectively reduced, for poor aspect ratios",
@@ -110,7 +110,7 @@ _ABLE: Final = (
     "NODES_TO_SURFACE",
     "NODE_TO_SURFACE",
 )
-# Largest number of lines of one contact or wall without an id; more lines may define a second one.
+# A contact or wall without an id has at most this number of lines; more lines may define a second one.
 _MOST_ROWS: Final = 8
 
 
@@ -137,7 +137,7 @@ class DeckPartSet(NamedTuple):
 
 @dataclass(eq=False, repr=False)
 class DeckParts:
-    """Data of each part, and part sets, keyed by id; None stands for a kind of set that cannot be read.
+    """Data of each part, and part sets, by id; None stands for a kind of set that cannot be read.
 
     ``all_known`` is False if an include was not read, a block is encrypted, or a keyword creates parts in a way that
     cannot be read: a part that is missing here may then exist. ``problems`` are unreadable ids of parts and sets, and
@@ -215,7 +215,7 @@ def find_rigid_materials(deck: Deck) -> Iterator[Card]:
 
 
 def name_material(card: Card, row: Row, column: CardColumn) -> str:
-    """Return the id of a material, with its offset, as text, or the name of the material if the deck uses names."""
+    """Return the id of a material (with its offset) as text, or the name of the material if the deck uses names."""
     value = card.integer(row, column)
     if value.problem:
         return value.field.text.upper()
@@ -230,7 +230,7 @@ def _add_parts(card: Card, parts: DeckParts) -> None:
     if "ATTACHMENT" in options:
         # The option ATTACHMENT adds one line, like the option PRINT.
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}
-    # A composite is one part with a material per ply; none of these materials makes the part rigid.
+    # A composite is one part with a material per ply, none of which makes the part rigid.
     if "COMPOSITE" in options:
         if len(card.rows) > 1:
             _add_part(card, card.rows[:2], "", parts)
@@ -409,7 +409,7 @@ def _read_card_sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
 
 
 def find_element_cards(deck: Deck, *, searched: bool) -> list[Card]:
-    """Return the element cards that may define shared nodes, or the other element cards if ``searched`` is False."""
+    """Return the element cards that may define shared nodes or, if ``searched`` is False, the other element cards."""
     cards = deck.named(*_SEARCHED)
     return [
         card
@@ -456,7 +456,7 @@ def _read_nodal_rigid_bodies(
     """Yield the nodal rigid bodies on a card."""
     options = card.options(_BODY)
     rows = card.lines
-    # Other options add lines, so a keyword with them defines only one body.
+    # Other options add lines, so a keyword with such options defines only one body.
     if options - {"TITLE"}:
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
@@ -598,7 +598,7 @@ class Entities(NamedTuple):
     all_known: bool
 
     def named(self, number: int) -> Entity | None:
-        """Return the contact or wall with this id; if there is none, the one with this number in order of definition.
+        """Return the contact or wall with this id or, failing that, with this number in the order of definition.
 
         An entry with an id is never found by its number.
         """

@@ -18,7 +18,7 @@ Times = tuple[float, float]
 """A rigid window (tr, td) [time of the model]."""
 
 WIDTH = 10  # Width of a field [characters].
-# Largest number of characters of a number; a space separates the number from the next field.
+# Largest number of characters of a number; a space separates it from the next field.
 LONGEST = WIDTH - 1
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17

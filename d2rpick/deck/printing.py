@@ -1,4 +1,4 @@
-"""Print rigid windows as solver input, with one function per solver and a table of the solvers.
+"""Print rigid windows as solver input: one function per solver, and a table of the solvers.
 
 LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window. Radioss: engine files that end at the switching
 times, with /RBODY/ON and /RBODY/OFF, or time sensors that switch within one engine run.
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 _FILE: Final = "switches.k"
 
-# CODE values that wait until a force ends and until a force acts, keyed by kind of contact.
+# CODE values that wait until a force ends and until a force acts, by kind of contact.
 _CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}
 _OF_OFFSET: Final = "OFFSET was not tested with the solver: it should exceed the thickness of the contact."
 _LEFT_ACTIVE = (
@@ -115,7 +115,7 @@ def _print_ls_dyna(
     ids = check_ids(printing.part)
     sets = list(_number_switch_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        # The lead id follows another id on the same line, with a space in between.
+        # The lead id follows another id on the same line, after a space.
         check_ids([printing.merge], LONGEST)
     texts = [(write_number(tr), write_number(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
@@ -386,7 +386,7 @@ def _print_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {fewest_cycles} cycles at least;"
         " if it takes fewer without switching, set --step-cap to at least the deformable time step."
     )
-    # The note is written to the file as well, because the file may be used without the card.
+    # The note is also written to the file, because the file may be used without the card.
     comments = [f"# {line}" for line in write_comments([step_warning])]
     lines = (
         f"/RUN/{printing.name}/1",

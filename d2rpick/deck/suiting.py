@@ -67,7 +67,7 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
 
 
 def find_name_of_files(run: RadiossRun) -> str | None:
-    """Return the common beginning of a run's file names, by which the engine finds the restart file.
+    """Return the beginning that a run's file names share, by which the engine finds the restart file.
 
     If the files have no common name, return the name in /RUN.
     """

@@ -90,7 +90,7 @@ def _make_joined_deck(text: str, flags: str, *lines: str) -> Example:
 
 
 class _Flags(NamedTuple):
-    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first flag."""
+    """The flags NRBF and NCSF on a card that makes parts rigid, and the field of the first of these flags."""
 
     nrbf: int
     ncsf: int
@@ -109,7 +109,7 @@ class _Flags(NamedTuple):
 
 
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
-    """Return the flags of a card; restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have no flags."""
+    """Return the flags of a card. Restarts have them on *RIGID_DEFORMABLE_CONTROL, and plain cards have none."""
     if card.header:
         nrbf = card.header.nrbf
         ncsf = card.header.ncsf
@@ -324,8 +324,8 @@ def _check_other_constraints(case: Case) -> Iterator[Objection]:
     satisfies this rule.
 
     Fix: Set the flag to 1 on the card that makes the part rigid and to 2 on the card that switches it back: NCSF for
-    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint joins parts
-    that do not become one rigid body, merge them by LRB first (D2R121).
+    spotwelds, rivets and node sets, NRBF for generalized welds, both for joints and extra nodes. If the constraint
+    joins parts that do not become one rigid body, merge them by LRB first (D2R121).
     """
     return _find_active(case, _OTHERS, "D2R121")
 

@@ -234,7 +234,7 @@ def _list_nearest(number: int, parts: DeckParts) -> str:
 
 
 def _find_absent(line: Switched, parts: DeckParts) -> Iterator[tuple[str, int]]:
-    """Yield the kind and id of each part set, part or lead part that a line names and the deck does not define."""
+    """Yield the kind and id of each part set, part or lead part that is named on a line but not defined in the deck."""
     if line.by_set and not line.part.problem:
         yield from (
             ("part set", set_id)
@@ -307,7 +307,7 @@ def _check_shared_nodes(case: Case) -> Iterator[Objection]:
 
 
 def find_lead_parts(first: Mapping[int, SwitchEvent]) -> dict[int, int]:
-    """Return the lead part of the rigid body of each part in ``first``, keyed by part id.
+    """Return the lead part of the rigid body of each part in ``first``, by part id.
 
     The lead part is the end of the chain of LRB entries.  A part that is not merged leads itself.
     """

@@ -10,9 +10,10 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import History, Samples
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.running.events import Event
+from d2rpick.report.follow import describe_news
+from d2rpick.running.events import RunEvent
 from d2rpick.running.looks import Looks
-from d2rpick.running.watch import Watch
+from d2rpick.running.watch import News, Watch, follow
 from tests.command import ROOT
 from tests.energies import require
 from tests.histories.test_contact_forces import rcforc
@@ -241,9 +242,8 @@ def test_a_run_is_watched_from_a_look_at_a_state_that_is_half_written(
 ) -> None:
     path = Path(as_glstat(make_falling_masses(), tmp_path))
     path.write_bytes(path.read_bytes().rpartition(b" global x velocity")[0])
-    begun, *_ = Watch([str(path)], Selection()).news()
-    assert begun.event == "begun"
-    assert begun.seen == pytest.approx(1 - 1 / 400)  # of the last but one state
+    news = Watch([str(path)], Selection()).look()
+    assert news.now == pytest.approx(1 - 1 / 400)  # of the last but one state
 
 
 def test_files_of_one_run_that_grow_in_turn_are_read_on_and_forces_are_not(
@@ -306,25 +306,20 @@ def test_the_events_of_a_file_that_grows_are_those_of_the_whole_file(
 ) -> None:
     path = Path(FORMS[form](make_falling_masses(), tmp_path))
     data = path.read_bytes()
-    whole = [
-        watch_event
-        for watch_event in Watch([str(path)], Selection()).news()
-        if watch_event.seen
-    ]
-    watch, events = Watch([str(path)], Selection()), list[Event]()
+    whole = list(follow([str(path)], Selection(), lasting=0.0))
+    watch, reads = Watch([str(path)], Selection()), list[News]()
     first = data[: _find_state(data, 0.3)]
     for content in (first, *(data[: int(share * len(data))] for share in SHARES)):
         path.write_bytes(content)
-        events += watch.news()
-    watch_events = [
-        watch_event
-        for watch_event in events
-        if watch_event.event not in ("begun", "restart")
+        reads.append(watch.look())
+    names = [str(path)]
+    events = [
+        event
+        for event in describe_news(reads, names, ())
+        if event.event not in ("begun", "restart")
     ]
-    assert watch_events == [
-        watch_event for watch_event in whole if watch_event.event != "begun"
-    ]
-    assert "flight" in {watch_event.event for watch_event in watch_events}
+    assert events == list(describe_news(whole, names, ()))[1:]
+    assert "flight" in {event.event for event in events}
 
 
 def test_a_growing_matsum_shows_the_flight_that_the_whole_one_shows(
@@ -333,16 +328,16 @@ def test_a_growing_matsum_shows_the_flight_that_the_whole_one_shows(
     """Its masses are lower bounds from the states that were read: the last states alone show 145 of 350 kg."""
     data = (ROOT / "sample_data" / "rollover_box.matsum").read_bytes()
     watch = Watch([str(tmp_path / "matsum")], Selection(parts=("box",)))
-    events = list[Event]()
+    events = list[RunEvent]()
     for share in (0.3, 0.45, 0.5, 0.55, 0.6, 0.65, 1.0):
         (tmp_path / "matsum").write_bytes(data[: int(share * len(data))])
-        events += watch.news()
+        events += watch.look().events
     whole = Watch(
         [str(ROOT / "sample_data" / "rollover_box.matsum")], Selection(parts=("box",))
     )
     kinds = ("flight", "switch", "contact")
     assert [event[:3] for event in events if event.event in kinds] == [
-        event[:3] for event in whole.news() if event.event in kinds
+        event[:3] for event in whole.look().events if event.event in kinds
     ]
     masses = require(watch.looks.evidence.history.momenta[0].masses)
     assert masses == pytest.approx([350.0, 6.0], rel=1e-3)

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     # A function that tests times and returns True for each time that passes.
     Keeps = Callable[[Samples], NDArray[np.bool_]]
 
-# Largest number of halvings of a sampling interval; they locate the end of a window to 1e-6 of the interval.
+# Largest number of halvings of a sampling interval, which locate the end of a window to 1e-6 of the interval.
 _HALVINGS: Final = 20
-# A level lies below the highest energy by this fraction, so that rounding does not hide the crossing [-].
+# A level is placed below the highest energy by this fraction, so that rounding does not hide the crossing [-].
 _BELOW: Final = 1e-12
 
 # Largest deviation of the error from its polyline [-], which is half a unit of the last printed digit.
@@ -73,7 +73,7 @@ def find_acceptable_windows(
 
 
 def cut_before_td(situation: Situation, windows: Samples) -> Samples:
-    """Truncate the windows one output interval before td, because a later tr saves nothing."""
+    """End the windows one output interval before td, because a later tr saves nothing."""
     time = situation.history.time
     state = int(np.searchsorted(time, situation.td))
     end = situation.td - float(time[state] - time[state - 1])
@@ -118,7 +118,7 @@ def find_alike_windows(
 def count_coverage(
     runs: Sequence[Samples],
 ) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
-    """Count, for each time, the runs with a window that contains the time.
+    """Count, for each time, the runs that have a window with this time.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def count_coverage(
     order = np.lexsort((-steps, times))
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
-    # There is no gap between two windows if one starts at the time at which the other ends.
+    # Two windows have no gap between them if one starts at the time at which the other ends.
     ordered = steps[order]
     touching = (ordered[:-1] > 0) & (ordered[1:] < 0)
     lasting = (stretches[:, 0] < stretches[:, 1]) | touching
@@ -165,7 +165,7 @@ def find_common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Return times in the flight before td; the verdict on tr changes at most once between two of them [time]."""
+    """Return times in the flight before td [time]. Between two of them, the verdict on tr changes at most once."""
     history = situation.history
     td = situation.td
     start = situation.earliest_tr
@@ -189,7 +189,7 @@ def make_monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
 
 
 def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
-    """Return a test of times for tr: the error is at most ``level``, and the energy is at most its limit."""
+    """Return a test of times for tr: the error must not exceed ``level``, nor the energy its limit."""
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
@@ -206,7 +206,7 @@ def _make_rule(situation: Situation) -> Keeps:
     has_limits = any(True for _ in situation.settings.limits)
 
     def keeps_rule(times: Samples) -> NDArray[np.bool_]:
-        # If nothing vibrates, any tr before td is acceptable unless td itself is not.
+        # If nothing vibrates, every tr before td is acceptable unless td itself is not.
         keeps = (
             np.ones(times.shape, np.bool_)
             if situation.at_rest
@@ -236,7 +236,7 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
 def make_error_profile(
     situation: Situation, candidates: Candidates, windows: Samples
 ) -> Samples:
-    """Return the error of tr in the windows as the points of a polyline that is accurate to 0.0005.
+    """Return the error of tr in the windows as the points of a polyline with an accuracy of 0.0005.
 
     Parameters
     ----------
@@ -278,14 +278,14 @@ def interpolate_error(profile: Samples, time: float) -> float:
 
 
 def _compute_errors(situation: Situation, times: Samples) -> Samples:
-    """Return the residuals, or the level errors if only the energy is known, in the shape of ``times`` [-]."""
+    """Return the residuals or, if only the energy is known, the level errors, in the shape of ``times`` [-]."""
     return np.asarray(
         np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
     )
 
 
 def _is_inside(times: Samples, windows: Samples) -> Samples:
-    """Return an array that is True for each time in one of the windows."""
+    """Return an array that is True for each time that lies in one of the windows."""
     window = np.searchsorted(windows[:, 0], times, side="right") - 1
     return np.asarray((window >= 0) & (times <= windows[window, 1]))
 

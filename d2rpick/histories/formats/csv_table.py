@@ -106,7 +106,7 @@ def find_time_column(
     energies: Sequence[str],
     numeric: frozenset[int],
 ) -> tuple[int, list[str]]:
-    """Return the time column and notes on assumptions; for curves side by side, the time of the first energy is used.
+    """Return the time column and notes on assumptions. If curves stand side by side, the first energy's time is used.
 
     If no column has the name of a time, return the first ``numeric`` column that is neither a known quantity nor
     named like row numbers.
@@ -172,7 +172,7 @@ def find_internal_energy(
 
 
 def find_column(source: str, layout: Layout, wanted: str) -> int:
-    """Return the column with this name or 1-based number; raise FormatError if there is none, or several."""
+    """Return the column with this name or 1-based number; raise FormatError if there is none or more than one."""
     columns = match_names(wanted, layout.names)
     if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
         columns = [*({*columns} | {int(wanted) - 1})]
@@ -204,12 +204,12 @@ def _list_columns(layout: Layout, columns: Sequence[int]) -> str:
 
 
 def recognises(head: bytes) -> bool:
-    """Return True if the first bytes of a file are text; only a full read shows whether the text is a table."""
+    """Return True if the first bytes of a file are text; whether the text is a table appears only when it is read."""
     return head.startswith(UTF16) or b"\0" not in head
 
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
-    """Open text files as tables or curves. An unterminated last line is used only if it has the selected columns."""
+    """Open text files as tables or curves. An unterminated last line is used only if it has all selected columns."""
     return [
         find_curves(text, selection) or Table(text, selection)
         for text in map(Text, sources)
@@ -266,12 +266,12 @@ class Table(Database):
 
     @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]  # a property overrides a field
-        """Notes on assumptions and omissions; the list is complete only after the required columns have been read."""
+        """Notes on assumptions and omissions, which are complete only after the required columns have been read."""
         give_if_written(lambda: self.time)
         return tuple(self._notes)
 
     def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:
-        """Return the columns that contain numbers, and a note on each named column without numbers."""
+        """Return the columns that contain numbers, and a note on each named column that contains none."""
         channels = list[str]()
         notes = list[str]()
         for name, column in self._columns.items():
@@ -287,7 +287,7 @@ class Table(Database):
 
     @property
     def energy_channel(self) -> str:
-        """The column whose name denotes internal energy, otherwise the only column besides the time."""
+        """The column whose name denotes internal energy or, failing that, the only column besides the time."""
         column = find_internal_energy(
             self.source, self._layout, [self._time, *self._own_times], self._numeric
         )
@@ -322,7 +322,7 @@ class Table(Database):
         return times
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
-        """Raise FormatError if the table has one row for each part at each time."""
+        """Raise FormatError if the table has a row for each part at each time."""
         # Imported here to keep start-up fast.
         from d2rpick.histories.interleaved import refuse_rows_of_parts
 
@@ -363,7 +363,7 @@ class Table(Database):
 
     @cached_property
     def _printed(self) -> list[list[str]]:
-        """The sampled rows of the table itself, without rows after the end of a curve and lines below the table."""
+        """The sampled rows of the table itself, without rows after the end of a curve or lines below the table."""
         return [row for row in self._sample if has_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
@@ -433,7 +433,7 @@ class Table(Database):
 def _is_whole_row(
     line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]
 ) -> bool:
-    """Return True if an unterminated line has all values and its last value is either unused or certainly complete."""
+    """Return True if an unterminated line has all values, the last of which is either unused or certainly complete."""
     cells = split_cells(line, layout.separator)
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
@@ -442,7 +442,7 @@ def _is_whole_row(
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:
-    r"""Write columns (n,) under their names, each number with the fewest digits that preserve it exactly.
+    r"""Write columns (n,) under their names, with the fewest digits per number that preserve it exactly.
 
     Examples
     --------
