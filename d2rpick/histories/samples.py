@@ -26,6 +26,9 @@ _ALIKE = 2.0
 _TOGETHER: Final = 8
 # A root has converged if its time changes by at most this fraction [-], which is about the rounding error.
 _STILL: Final = 8 * float(np.finfo(np.float64).eps)
+# Number of halvings of a bracket that are tested together if there are few brackets.
+_HALVED_TOGETHER: Final = 5
+_FEW: Final = 100  # Largest number of brackets that count as few.
 HALVINGS: Final = 50  # Number of bisections that narrow a bracket to rounding error
 
 
@@ -361,6 +364,56 @@ def draw_outline(time: Samples, values: Samples, stretches: int) -> Samples:
     return np.stack([time[at], values[at]])
 
 
+def halve_brackets(
+    passes: Callable[[Samples], NDArray[np.bool_]],
+    within: Samples,
+    beyond: Samples,
+    halvings: int,
+) -> Samples:
+    """Halve the brackets around the times at which a test changes its result; return their ends ``within``.
+
+    Several halvings of a few brackets are tested at once, because few times cost as much as one time. The result is
+    that of single halvings.
+
+    Parameters
+    ----------
+    passes : callable
+        True at ``within`` and False at ``beyond``, for arrays of their shape with a further first axis.
+    within, beyond : array
+        Ends of the brackets, in either order.
+    halvings : int
+        Number of halvings.
+
+    Examples
+    --------
+    >>> float(halve_brackets(lambda t: t <= 0.7, np.array(0.0), np.array(1.0), 3))
+    0.625
+    """
+    while halvings:
+        together = min(halvings, _HALVED_TOGETHER if within.size <= _FEW else 1)
+        times = np.stack([within, beyond])
+        for _ in range(together):
+            times = _insert_middles(times)
+        passed = passes(times)
+        end = np.zeros((1, *within.shape), np.intp)
+        for level in reversed(range(together)):
+            middle = end + 2**level
+            end = np.where(np.take_along_axis(passed, middle, 0), middle, end)
+        within, beyond = (
+            np.take_along_axis(times, index, 0)[0] for index in (end, end + 1)
+        )
+        halvings -= together
+    return within
+
+
+def _insert_middles(times: Samples) -> Samples:
+    """Insert the middle between neighbours along the first axis, shape (n, ...) to (2 n - 1, ...)."""
+    denser = np.empty((2 * len(times) - 1, *times.shape[1:]))
+    denser[::2] = times
+    denser[1::2] = (times[1:] + times[:-1]) / 2
+    return denser
+
+
 class Roots(NamedTuple):
     """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, and the root ``at``."""
 
@@ -370,11 +423,11 @@ class Roots(NamedTuple):
 
 
 def narrow_brackets(
-    inside: Callable[[Samples], Samples | NDArray[np.bool_]],
+    inside: Callable[[Samples], Samples],
     within: Samples,
     beyond: Samples,
     *,
-    slope: Callable[[Samples], Samples] | None = None,
+    slope: Callable[[Samples], Samples],
     steps: int = HALVINGS,
 ) -> Roots:
     """Narrow the brackets around the roots at which ``inside`` changes from positive to non-positive.
@@ -382,15 +435,14 @@ def narrow_brackets(
     Parameters
     ----------
     inside : callable
-        Positive at ``within`` and not at ``beyond``, an array for an array; it may return booleans.
+        Positive at ``within`` and not at ``beyond``, an array for an array.
     within, beyond : array
         Ends of the brackets, in either order.
-    slope : callable, optional
-        Derivative of a smooth ``inside``: Newton steps are used if they stay within their bracket, and each root stays
-        once it has converged, so that it does not depend on the other roots searched with it.
+    slope : callable
+        Derivative of ``inside``: Newton steps are used if they stay within their bracket, and each root stays once it
+        has converged, so that it does not depend on the other roots searched with it.
     steps : int
         Largest number of steps.
-        At most.
 
     Examples
     --------
@@ -406,15 +458,14 @@ def narrow_brackets(
         within = np.where(good, at, within)
         beyond = np.where(good, beyond, at)
         following = (within + beyond) / 2
-        if slope is not None:
-            rise = slope(at)
-            newton = at - value / np.where(rise == 0, np.inf, rise)
-            inner = (newton >= np.minimum(within, beyond)) & (
-                newton <= np.maximum(within, beyond)
-            )
-            following = np.where(inner, newton, following)
-            following = np.where(still, at, following)
-            still |= np.abs(following - at) <= _STILL * np.abs(at)
+        rise = slope(at)
+        newton = at - value / np.where(rise == 0, np.inf, rise)
+        inner = (newton >= np.minimum(within, beyond)) & (
+            newton <= np.maximum(within, beyond)
+        )
+        following = np.where(inner, newton, following)
+        following = np.where(still, at, following)
+        still |= np.abs(following - at) <= _STILL * np.abs(at)
         at = following
         if still.all():
             break

@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.pair.candidates import Candidate, Candidates, judge_times
 from d2rpick.choice.pair.warnings import find_largest_energy
-from d2rpick.histories.samples import find_crossings, merge_times, narrow_brackets
+from d2rpick.histories.samples import find_crossings, halve_brackets, merge_times
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
@@ -193,9 +193,10 @@ def _make_limit_on_error(situation: Situation, level: float) -> Keeps:
     highest = find_largest_energy(situation)
 
     def has_small_error(times: Samples) -> NDArray[np.bool_]:
-        return (situation.errors(times) <= level) & (
-            situation.vibration.whole.energies(times) <= highest
-        )
+        is_small = situation.errors(times) <= level
+        if highest < np.inf:
+            is_small &= situation.vibration.whole.energies(times) <= highest
+        return np.asarray(is_small)
 
     return has_small_error
 
@@ -228,9 +229,9 @@ def _find_windows(grid: Samples, keeps: Keeps) -> Samples:
     if not inner.size:
         return inner
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow_brackets(
-        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, steps=_HALVINGS
-    ).within
+    return halve_brackets(
+        lambda t: keeps(t.ravel()).reshape(t.shape), inner, beyond, _HALVINGS
+    )
 
 
 def make_error_profile(
@@ -256,20 +257,21 @@ def make_error_profile(
         return np.zeros((2, 0))
     inner = make_monotone_grid(situation, candidates)
     times = merge_times(inner[_is_inside(inner, windows)], windows)
+    errors = _compute_errors(situation, times)
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
-        middles = middles[_is_inside(middles, windows)]
-        bent = (
-            np.abs(
-                _compute_errors(situation, middles)
-                - np.interp(middles, times, _compute_errors(situation, times))
-            )
-            > _EXACT / 2
-        )
+        is_between = (times[:-1] < middles) & (middles < times[1:])
+        middles = middles[is_between & _is_inside(middles, windows)]
+        errors_between = _compute_errors(situation, middles)
+        deviations = errors_between - np.interp(middles, times, errors)
+        bent = np.abs(deviations) > _EXACT / 2
         if not bent.any():
             break
-        times = merge_times(times, middles[bent])
-    return _thin_out(times, _compute_errors(situation, times), windows)
+        times = np.append(times, middles[bent])
+        errors = np.append(errors, errors_between[bent])
+        order = np.argsort(times)
+        times, errors = times[order], errors[order]
+    return _thin_out(times, errors, windows)
 
 
 def interpolate_error(profile: Samples, time: float) -> float:
@@ -292,8 +294,10 @@ def _is_inside(times: Samples, windows: Samples) -> Samples:
 
 def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
     """Thin out a curve: keep the ends of windows and, between them, the points farthest from straight lines."""
-    points = np.flatnonzero(np.isin(times, windows))
+    is_kept = np.zeros(times.shape, np.bool_)
+    is_kept[np.searchsorted(times, windows)] = True
     while True:
+        points = np.flatnonzero(is_kept)
         deviations = np.abs(errors - np.interp(times, times[points], errors[points]))
         worst = np.repeat(
             np.maximum.reduceat(deviations, points), np.diff(points, append=times.size)
@@ -301,4 +305,4 @@ def _thin_out(times: Samples, errors: Samples, windows: Samples) -> Samples:
         new = np.flatnonzero((deviations == worst) & (deviations > _EXACT / 2))
         if not new.size:
             return np.stack([times[points], errors[points]])
-        points = np.union1d(points, new)
+        is_kept[new] = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -60,10 +61,10 @@ def split_cells(line: str, separator: str | None) -> list[str]:
     >>> split_cells('"part 3, left", 1.5 ,', ",")
     ['part 3, left', '1.5', '']
     """
-    if '"' not in line and separator is None:
-        return line.split()
     if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)]
+        if separator is None:
+            return line.split()
+        return [*map(str.strip, line.split(separator))]
     sign = separator or " "
     if separator is None:
         line = " ".join(line.split())
@@ -87,6 +88,8 @@ def is_skipped(line: str) -> bool:
     >>> [line for line in ("", "# 1,2", "#DIV/0!,1", "|---|---|", "-1.5,2") if not is_skipped(line)]
     ['#DIV/0!,1', '-1.5,2']
     """
+    if line[:1].isdigit():
+        return False  # Most lines of a table, whose number decides how long this takes.
     line = line.lstrip()
     if not line:
         return True
@@ -112,6 +115,34 @@ def parse_cell(cell: str, decimal: str, thousands: str = "") -> float | None:
 def has_number(cell: str, decimal: str, thousands: str = "") -> bool:
     """Return True if a cell contains a number. The number is not computed, because many cells are tested."""
     return _written_number(cell, decimal, thousands) is not None
+
+
+def split_columns_of_numbers(
+    lines: Sequence[str], separator: str | None, decimal: str, columns: int
+) -> list[list[str]] | None:
+    """Return the cells of each column if all lines have ``columns`` plain numbers, otherwise None; for many lines.
+
+    Examples
+    --------
+    >>> split_columns_of_numbers(["0,1.5", "1,-2e3"], ",", ".", 2)
+    [['0', '1'], ['1.5', '-2e3']]
+    >>> split_columns_of_numbers(["0,1.5", "1,n/a"], ",", ".", 2)
+    """
+    if separator is None or separator == decimal:
+        return None
+    rows = "\n".join([*lines, ""])
+    if not _compile_rows(separator, decimal, columns).fullmatch(rows):
+        return None
+    cells = rows.replace("\n", separator).split(separator)[:-1]
+    return [cells[column::columns] for column in range(columns)]
+
+
+@lru_cache
+def _compile_rows(separator: str, decimal: str, columns: int) -> re.Pattern[str]:
+    """Return the pattern of any number of rows, each ending with a line feed, of ``columns`` plain numbers."""
+    number = _NUMBER[decimal].pattern
+    further = f"(?:{re.escape(separator)}{number}){{{columns - 1}}}"
+    return re.compile(rf"(?:{number}{further}\n)*+", re.ASCII)
 
 
 def _written_number(cell: str, decimal: str, thousands: str) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import compress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,7 +11,12 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, give_if_written, list_names
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import has_number, is_skipped, split_cells
+from d2rpick.histories.formats.cells import (
+    has_number,
+    is_skipped,
+    split_cells,
+    split_columns_of_numbers,
+)
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import (
     Layout,
@@ -78,25 +84,22 @@ def find_own_times(layout: Layout) -> tuple[int, ...]:
     return times
 
 
-def find_numeric_columns(
-    layout: Layout, sample: Sequence[Sequence[str]]
-) -> frozenset[int]:
-    """Return the columns with a number in at least one sampled row; all columns if no row was sampled."""
-    columns = range(layout.columns)
-    if not sample:
-        return frozenset(columns)
+def find_numeric_columns(sample: Sequence[Sequence[str]]) -> frozenset[int]:
+    """Return the columns with a number in at least one sampled cell; all columns if no row was sampled."""
     return frozenset(
         column
-        for column in columns
-        if any(has_number(row[column], ".") for row in sample)
+        for column, cells in enumerate(sample)
+        if not cells or any(has_number(cell, ".") for cell in cells)
     )
 
 
-def _sample_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
-    """Return the cells of sampled rows: the first rows, the last rows, and evenly spaced rows in between."""
-    lines = [line for line in text.sample(begin) if not is_skipped(line)]
-    rows = [split_cells(line, layout.separator) for line in lines]
-    return [row for row in rows if len(row) >= layout.columns]
+def _split_columns(lines: Sequence[str], layout: Layout) -> list[list[str]]:
+    """Return the cells of each column, from the lines that are rows of the table."""
+    rows = [
+        split_cells(line, layout.separator) for line in lines if not is_skipped(line)
+    ]
+    rows = [row for row in rows if len(row) >= layout.columns]
+    return [[row[column] for row in rows] for column in range(layout.columns)]
 
 
 def find_time_column(
@@ -226,13 +229,20 @@ class Table(Database):
         self.source, self._text = text.name, text
         layout = find_layout(text)
         self._begin = text.place(layout.start)
-        sample = _sample_rows(text, self._begin, layout)
-        self._layout = layout = add_thousands(layout, sample)
-        # Cells of the sampled rows, with "." as the decimal sign.
+        lines = text.sample(self._begin)
+        sample = split_columns_of_numbers(
+            lines, layout.separator, layout.decimal, layout.columns
+        )
+        self._are_numbers = sample is not None
+        if sample is None:
+            sample = _split_columns(lines, layout)
+            layout = add_thousands(layout, sample)
+        self._layout = layout
+        # Cells of each column in the sampled rows, with "." as the decimal sign.
         self._sample = sample
         if layout.decimal != "." or layout.thousands:
-            self._sample = [[layout.plain(cell) for cell in row] for row in sample]
-        self._numeric = find_numeric_columns(layout, self._sample)
+            self._sample = [[*map(layout.plain, cells)] for cells in sample]
+        self._numeric = find_numeric_columns(self._sample)
         self._own_times = find_own_times(layout)
         self._time, notes = find_time_column(
             text.name, layout, selection.time, selection.energy, self._numeric
@@ -278,7 +288,7 @@ class Table(Database):
             if column in self._numeric:
                 channels.append(name)
                 continue
-            words = [row[column] for row in self._sample if row[column]]
+            words = [cell for cell in self._sample[column] if cell]
             if words:
                 notes.append(
                     f"column {column + 1} {name!r} holds no numbers ({words[0]!r}) and was left out"
@@ -329,9 +339,8 @@ class Table(Database):
         for column in self._needed[1:]:
             energy = give_if_written(partial(self._values, column))
             if energy is not None and energy.size == times.size:
-                rows = self._sample[: self._text.some]
                 printed = {
-                    name: [row[position] for row in rows]
+                    name: self._sample[position][: self._text.some]
                     for name, position in self._columns.items()
                 }
                 refuse_rows_of_parts(self.source, times, energy, printed)
@@ -357,14 +366,17 @@ class Table(Database):
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Return the precision with which the times and these columns were printed."""
-        times = [row[self._time] for row in self._printed]
-        energies = [row[self._columns[name]] for row in self._printed for name in names]
-        return find_precisions(times, energies, self.time)
+        printed = self._printed
+        energies = [cell for name in names for cell in printed[self._columns[name]]]
+        return find_precisions(printed[self._time], energies, self.time)
 
     @cached_property
-    def _printed(self) -> list[list[str]]:
-        """The sampled rows of the table itself, without rows after the end of a curve or lines below the table."""
-        return [row for row in self._sample if has_number(row[self._time], ".")]
+    def _printed(self) -> Sequence[Sequence[str]]:
+        """The sampled cells of each column, without rows after the end of a curve or lines below the table."""
+        if self._are_numbers:
+            return self._sample
+        is_row = [has_number(cell, ".") for cell in self._sample[self._time]]
+        return [[*compress(cells, is_row)] for cells in self._sample]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Return the requested or default columns. An unterminated last line is used only if it has all of them."""
@@ -438,7 +450,7 @@ def _is_whole_row(
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
         return len(cells) >= layout.columns
-    return is_whole_field(layout.plain(cells[last]), [row[last] for row in sample])
+    return is_whole_field(layout.plain(cells[last]), sample[last])
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

@@ -143,12 +143,12 @@ def _add_header(table: Layout, header: Header) -> Layout:
     )
 
 
-def add_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
-    """Add the thousands separator without which some cells of ``rows`` would not be numbers."""
+def add_thousands(table: Layout, columns: Sequence[Sequence[str]]) -> Layout:
+    """Add the thousands separator without which some cells of the columns would not be numbers."""
     odd = [
         cell
-        for row in rows
-        for cell in row
+        for cells in columns
+        for cell in cells
         if not has_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     if odd:
@@ -213,6 +213,8 @@ def _find_rows(
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split_cells(line, sign)) for i, line in sample]
+            if sum(len(row) > 1 for _, row in cells) <= best_count:
+                continue  # Fewer rows than with an earlier form.
             if with_groups:
                 thousands = find_thousands(
                     [cell for _, row in cells for cell in row], decimal
@@ -250,7 +252,7 @@ def _find_numbers_in_row(
     # Most lines have only one cell here, because most of the separators that are tried are wrong.
     if len(cells) < 2:
         return ()
-    written = [form.number(cell) is not None for cell in cells]
+    written = [has_number(cell, form.decimal, form.thousands) for cell in cells]
     numbers = tuple(
         number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
     )

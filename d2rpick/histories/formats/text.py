@@ -221,7 +221,7 @@ def find_precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        if len(field) > digits:  # A field cannot have more digits than characters.
+        if _count_at_most(field) > digits:
             digits = max(digits, _count_significant_digits(field))
         if digits >= _FULL:
             return EXACT, EXACT
@@ -277,6 +277,14 @@ def is_whole_field(field: str, above: Sequence[str]) -> bool:
         and 10 <= abs(int(exponent)) <= longest_start
     )
     return decimals > 1 and padded and not doubtful
+
+
+def _count_at_most(field: str) -> int:
+    """Return an upper limit of the number of significant digits of a field, which costs less than the number."""
+    written = field.lstrip("+-0.")
+    if not written[:1].isdigit():
+        written = field  # The zeros of 0.00000E+00 count.
+    return len(written) - ("." in written)
 
 
 def _count_significant_digits(field: str) -> int:
