@@ -565,10 +565,14 @@ CONSTRAINT_KINDS: Final = tuple(_CONSTRAINTS)
 
 
 def read_merged_bodies(deck: Deck) -> Iterator[tuple[CardField, frozenset[int]]]:
-    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body."""
+    """Yield the place and the two parts of each pair that *CONSTRAINED_RIGID_BODIES merges into one rigid body.
+
+    With the option SET, the second number is a part set, and only the first part is returned.
+    """
     for card in deck.named("CONSTRAINED_RIGID_BODIES"):
+        has_set = "SET" in card.options("CONSTRAINED_RIGID_BODIES")
         for row in card.data:
-            values = card.numbers(row, MERGED_BODIES)
+            values = card.numbers(row, MERGED_BODIES)[: 1 if has_set else 2]
             ids = (
                 value.value + card.transform.part
                 for value in values
