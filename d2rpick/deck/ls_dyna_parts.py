@@ -561,7 +561,17 @@ _CONSTRAINTS: Final[
 }
 
 
-CONSTRAINT_KINDS: Final = tuple(_CONSTRAINTS)
+# Flags of a switching card that delete each kind of constraint (vendor keyword data).
+# No source states which flag deletes extra nodes and joints, so both are listed.
+DELETING_FLAGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "nodal rigid body": ("NRBF",),
+    "generalized weld": ("NRBF",),
+    "spotweld": ("NCSF",),
+    "rivet": ("NCSF",),
+    "constrained node set": ("NCSF",),
+    "extra nodes": ("NRBF", "NCSF"),
+    "joint": ("NRBF", "NCSF"),
+}
 
 
 def read_merged_bodies(deck: Deck) -> Iterator[tuple[CardField, frozenset[int]]]:
