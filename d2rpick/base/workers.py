@@ -108,11 +108,11 @@ class Cores(Farm):
         self._pool = self._new(processes)
         self._is_closed = False
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *exception: object) -> None:
         self._is_closed = True
         self._leash.close()
         # After an interrupt, the thread that uses the pool may hold its lock for ever: it waits for a dead process.
-        if kind is not KeyboardInterrupt:
+        if KeyboardInterrupt not in exception:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
     def answers(

@@ -279,6 +279,8 @@ def find_leg_results(order: Order, evidence: GrowingEvidence) -> LegFindings:
     flights = evidence.flights()
     flies = bool(flights) and flights[-1].end is None
     free = evidence.free_since(history.end)
+    if flies:
+        free = max(free, flights[-1].start)
     tr = _choose_end(order, history, free)
     half_period = evidence.motion.longest_swing(history.end)
     findings = LegFindings(free=free, flies=flies, tr=tr, swing=half_period)

@@ -202,9 +202,11 @@ class GrowingEvidence:
         start, end = begin + first, begin + last
         states = [*_sample_states(begin, start), *_sample_states(start + 1, end)]
         so_far = select_states(momenta, np.array(states, np.intp))
-        if so_far.change(witness.members) <= so_far.noise(witness.members):
-            return 0.0  # A fit to a constant momentum would give a false gravity.
         laws = get_laws_of(so_far, witness.members, history.balance)
+        if witness.is_constant(first, last):
+            # A fit to a constant momentum would find false gravity.
+            flies = witness.moves(first, last) and not laws.is_carried
+            return 0.0 if flies else None
         return laws.gravity(states.index(start), len(states) - 1)
 
     def free_since(self, time: float) -> float:

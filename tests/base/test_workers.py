@@ -1,4 +1,4 @@
-"""Calls give the same results here, in processes and on a cluster; a process that dies stops nothing."""
+"""Calls give the same results in this process, in other processes and on a cluster; a dead process stops nothing."""
 
 import os
 import signal

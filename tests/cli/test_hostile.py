@@ -1,4 +1,4 @@
-"""Closed streams, full disks, interrupts and damaged files: one error line, or the result."""
+"""Closed streams, full disks, interrupts and damaged files give one error line, or the result."""
 
 import gzip
 import io
@@ -253,7 +253,7 @@ def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
-    """The file size is limited in blocks of 1 kB, which the second row exceeds."""
+    """The file size is limited in blocks of 1 kB, and the second row exceeds the limit."""
     ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
     again.write_bytes(Path(ENERGY).read_bytes())
     assert (
@@ -393,7 +393,7 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         "deep.h5": make_deep_file(100),
         "still.gz": gzip.compress(
             small + (b"#" * 4095 + b"\n") * (1 << 11)
-        ),  # 1,000 times as many bytes, but still few
+        ),  # 1,000 times as many bytes, which are still few
         "line.csv": small + b"#" * 1_000_000,
     }.items():
         (tmp_path / name).write_bytes(content)
@@ -523,7 +523,7 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
 
 
 def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
-    """If they have no common column, no state is left, as if the run had written none."""
+    """If the files have no common column, no state is left, as if the run had written none."""
     for name, head in (
         ("one", "time,internal_energy"),
         ("other", "time,force"),

@@ -87,7 +87,7 @@ def make_driving(folder: Path) -> Driving:
 
 
 def check_finished_run(report: dict[str, Any], folder: Path) -> None:
-    """Check what must hold for every finished run: it is complete, and rigid in the flight only."""
+    """Check what must hold for every finished run: it is complete, and rigid only in the flight."""
     switched = [
         window_row for window_row in report["windows"] if window_row["reason"] is None
     ]
@@ -242,7 +242,7 @@ def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
 def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     tmp_path: Path, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    """If restart files are damaged, the run continues from an earlier one, in the end from that of the starter."""
+    """If restart files are damaged, the run continues from an earlier one, if necessary from that of the starter."""
     shutil.copytree(whole[0] / "deck", tmp_path / "deck")
     shutil.copytree(whole[0] / "run", tmp_path / "run")
     journal = tmp_path / "run" / "drive.ndjson"
