@@ -130,7 +130,7 @@ class Request(ChoiceOptions, ReadingOptions):
         "Velocity of the frame at time 0. Nothing else moves at time 0.", TIME, "vz0"
     )
     no_verify: bool = make_option(
-        "Judge by the energy level alone, without an oscillator.",
+        "Judge by the energy level alone, without a vibration model.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     run_folder: str | None = None  # Folder of the run with the files in `history`.

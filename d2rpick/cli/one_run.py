@@ -136,8 +136,9 @@ def suggest(
 
     If you omit --td, d2rpick chooses both times, in --td-window or in the longest flight.
 
-    A candidate is a time before td at which the internal energy has the same level as at td.  d2rpick verifies each
-    candidate with the floating oscillator that describes the record.  It recommends the best candidate and a better td.
+    A candidate is a time before td at which the parts have nearly the same deformation as at td.  d2rpick judges each
+    candidate by the vibration model that fits the record.  It recommends the best candidate, and names a better td if
+    there is one.
 
     Examples
     --------
@@ -239,9 +240,9 @@ def explore(
 ) -> None:
     """Show for each time td to switch back the best tr, the error, and the saving.
 
-    It compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.  It
-    judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and rigid
-    time.  d2rpick also names the nearest td with half the error.
+    d2rpick compares evenly spaced values of td, and every peak of the energy, in --td-window or in the longest flight.
+    It judges each td as `suggest --td` does.  The table lists the pairs that no other pair beats in both error and
+    rigid time.  d2rpick also names the nearest td with half the error.
 
     Examples
     --------
@@ -287,7 +288,7 @@ def explore(
 @options.make_click_option(
     "min_mean_energy",
     Option(
-        "Lowest allowed ratio of the mean energy after td to that of the reference run; the highest is as far above 1.",
+        "Smallest allowed mean energy after td, divided by the mean energy of the reference run; the largest is 2 - E.",
         FRACTION,
         "E",
     ),

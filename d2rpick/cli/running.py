@@ -253,7 +253,7 @@ def first(
     """Write a copy of DECK that switches the parts in its first run, so that no reference run is needed.
 
     The solver makes the parts rigid when no contact force has acted for the time --wait, and deformable at the next
-    force.  For Radioss, the copy contains restart segments that sensors end, and the missing rigid bodies.  For
+    force.  For Radioss, the copy contains engine files whose runs sensors end, and the missing rigid bodies.  For
     LS-DYNA, it contains switches with contact codes.
 
     Examples
